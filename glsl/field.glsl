@@ -1,14 +1,14 @@
 // A lookup in a field: position to stored samples and weights, and their weighted sum. The twin is Lattice::corners and
-// ShadowField::lookup. A quad is four coefficients: vec4, or four halves. DIRECTIONS 0 cube, 1 latitude-longitude;
-// SPACING 0 chord, 1 linear. They and the other choices are constants in plain conditions, of which the compiler keeps
-// one side; only what a driver must not see is left to the preprocessor: how fields are bound and read.
+// ShadowField::lookup. A quad is four coefficients: vec4, or four halves. Choices are constants in plain
+// conditions, of which the compiler keeps one side; only what a driver must not see is left to the preprocessor: how
+// fields are bound and read.
 
 const uint FIELD_QUADS = FIELD_STRIDE / 4; // of an occlusion sample
 const uint CHANNEL_QUADS = STRIDE / 4;     // of a channel of radiance, and of a transfer vector
 const uint FETCHED_QUADS = FIELD_QUADS > CHANNEL_QUADS ? FIELD_QUADS : CHANNEL_QUADS;
 
-// Samples that a lookup interpolates: four directions on each of two shells.
-const uint CORNERS = 8;
+// Samples that a lookup interpolates: the corners of a tetrahedron.
+const uint CORNERS = 4;
 
 // The bits of a half, moved to where a float has them (SHIFTED), are that float times 2^-112, which the weights undo.
 const float FIELD_UNIT = SHIFTED == 1 ? 5192296858534827628530496329220096.0 : 1.0;
@@ -20,55 +20,23 @@ struct FieldPlace {
 
 #include "cube.glsl"
 
-// Base of the face's stored cells, and coordinates among them (samples at whole numbers, border included). A row's ends
-// are samples (edges 1), or half a step beyond the last that is the face's own (edges 0).
-void field_plane_cube(vec3 p, float edges, out uint base, out vec2 cell) {
-    uint face = cube_face(p);
+// Place on the face that a direction meets, among its stored samples. The first and the last of a row lie on the face's
+// edges, the others at equal steps between them (edges 1), or half a step farther in (edges 0).
+vec2 field_plane(vec3 p, float edges, out float face) {
+    uint met = cube_face(p);
+    face = float(met);
     // At the very centre any direction will do; it must only be a number.
-    vec2 warped = cube_warped(face, p, 1e-30);
-    base = face * (CELLS + 2) * (CELLS + 2);
-    cell = warped * (0.5 * CELLS + 0.5 * edges) + (0.5 * CELLS + 0.5);
+    vec2 at = cube_warped(met, p, 1e-30) * (0.5 * CELLS + 0.5 * edges) + (0.5 * CELLS + 0.5);
+    // The outermost steps are half as wide, and count as whole ones.
+    return at + (1.0 - edges) * (min(at - 1.0, 0.0) + max(at - CELLS, 0.0));
 }
 
-void field_plane_latlon(vec3 p, out vec2 cell) {
-    float latitude = acos(clamp(p.y * inversesqrt(max(dot(p, p), 1e-30)), -1.0, 1.0)) / PI * LATITUDES - 0.5;
-    float turn = p.x == 0.0 && p.z == 0.0 ? 0.0 : atan(p.z, p.x) / (2.0 * PI);
-    cell = vec2((turn - floor(turn)) * LONGITUDES, clamp(latitude, 0.0, LATITUDES - 1.0));
-}
-
-// The stored directions of one shell around a direction.
-struct FieldCells {
-    uint base; // of the face
-    uvec2 first;
-    uvec2 second;
-    vec2 fraction;
-};
-
-const uint COLUMNS = DIRECTIONS == 0 ? CELLS + 2 : LONGITUDES;
-const uint PLANE = DIRECTIONS == 0 ? 6 * COLUMNS * COLUMNS : LATITUDES * LONGITUDES;
-
-FieldCells field_cells(vec3 p, float edges) {
-    FieldCells cells;
-    cells.base = 0;
-    vec2 cell;
-    vec2 low;
-    if (DIRECTIONS == 0) {
-        field_plane_cube(p, edges, cells.base, cell);
-        low = min(floor(cell), vec2(CELLS));
-        cells.first = uvec2(low);
-        cells.second = cells.first + 1;
-    } else {
-        field_plane_latlon(p, cell);
-        low = vec2(floor(cell.x), min(floor(cell.y), max(LATITUDES - 2.0, 0.0)));
-        cells.first = uvec2(uint(low.x) % LONGITUDES, uint(low.y));
-        cells.second = uvec2((uint(low.x) + 1) % LONGITUDES, min(cells.first.y + 1, uint(LATITUDES) - 1));
-    }
-    cells.fraction = cell - low;
-    return cells;
-}
+// Place in the stored arrangement: x and y along a face, z from shell to shell; samples are at whole numbers.
+const float COLUMNS = CELLS + 2;
+const float PLANE = 6.0 * COLUMNS * COLUMNS;
 
 // radial: slope, offset, inner and outer radius of the field's shells.
-// edges: see field_plane_cube.
+// edges: see field_plane.
 FieldPlace field_place(vec3 p, vec4 radial, float edges) {
     float d = sqrt(dot(p, p));
     float near = clamp(d, radial.z, radial.w);
@@ -77,31 +45,37 @@ FieldPlace field_place(vec3 p, vec4 radial, float edges) {
     float edge = min(radial.z, 1.0);
     float reach = near * near + (1.0 - edge * edge);
     float h = 1.0 / (reach + sqrt(max(0.0, (near - edge) * (near + edge) * reach)));
-    float coordinate = SPACING == 0 ? sqrt(0.5 * h) : near;
-    float t = clamp(radial.x * coordinate + radial.y, 0.0, SHELLS - 1.0);
     float beyond = radial.w / max(d, radial.w);
-    float unscale = FIELD_UNIT * (SPACING == 0 ? h : 1.0) * beyond * beyond;
+    float unscale = FIELD_UNIT * h * beyond * beyond;
 
-    FieldCells cells = field_cells(p, edges);
+    vec3 at;
+    float face;
+    at.xy = field_plane(p, edges, face);
+    at.z = clamp(radial.x * sqrt(0.5 * h) + radial.y, 0.0, SHELLS - 1.0);
+    // A cell is cut into six tetrahedra about its diagonal from the sample of even numbers to that of odd ones, so that
+    // cells that touch are cut alike. Along each the fractions fall in one order.
+    vec3 low = min(floor(at), vec3(CELLS, CELLS, max(SHELLS - 2.0, 0.0)));
+    vec3 odd = low - 2.0 * floor(0.5 * low);
+    vec3 up = 1.0 - 2.0 * odd;
+    vec3 f = odd + up * (at - low);
+    vec3 stride = vec3(1.0, COLUMNS, SHELLS > 1 ? PLANE : 0.0);
+    float first = face * COLUMNS * COLUMNS + dot(low + odd, stride);
+    stride *= up;
+    float all = first + stride.x + stride.y + stride.z;
+    float most = max(max(f.x, f.y), f.z), least = min(min(f.x, f.y), f.z);
+    float middle = f.x + f.y + f.z - most - least;
+    float by_most = f.x == most ? stride.x : f.y == most ? stride.y : stride.z;
+    float by_least = f.z == least ? stride.z : f.y == least ? stride.y : stride.x;
+
     FieldPlace place;
-    float shell = min(floor(t), max(SHELLS - 2.0, 0.0));
-    float radial_fraction = t - shell;
-    uint base = cells.base + uint(shell) * PLANE;
-    uint up = SHELLS > 1 ? PLANE : 0;
-    vec2 fraction = cells.fraction;
-    // The lowest bits of a corner's number choose the cell along x and y, the next bit the shell.
-    [[unroll]] for (uint k = 0; k < CORNERS; k++) {
-        bool right = (k & 1) != 0;
-        bool lower = (k & 2) != 0;
-        bool outer = (k & 4) != 0;
-        float wx = right ? fraction.x : 1.0 - fraction.x;
-        float wy = lower ? fraction.y : 1.0 - fraction.y;
-        float wz = outer ? radial_fraction : 1.0 - radial_fraction;
-        uint x = right ? cells.second.x : cells.first.x;
-        uint y = lower ? cells.second.y : cells.first.y;
-        place.corner[k] = base + y * COLUMNS + x + (outer ? up : 0);
-        place.weight[k] = wx * wy * (wz * unscale);
-    }
+    place.corner[0] = uint(first);
+    place.corner[1] = uint(first + by_most);
+    place.corner[2] = uint(all - by_least);
+    place.corner[3] = uint(all);
+    place.weight[0] = unscale * (1.0 - most);
+    place.weight[1] = unscale * (most - middle);
+    place.weight[2] = unscale * (middle - least);
+    place.weight[3] = unscale * least;
     return place;
 }
 

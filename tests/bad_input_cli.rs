@@ -94,7 +94,7 @@ fn field_files() {
         return;
     }
     let case = case(&[("m.obj", &format!("{TRIANGLE}f 1 2 3\n"))]);
-    good(&case.folder, &["bake", "m.obj", "-o", "f.sf", "--lattice", "cube:2x2", "--face-px", "8"]);
+    good(&case.folder, &["bake", "m.obj", "-o", "f.sf", "--lattice", "cube:2x3", "--face-px", "8"]);
     let whole = std::fs::read(case.folder.join("f.sf")).unwrap();
     let damaged = |bytes: &[u8], parts: &[&str]| {
         std::fs::write(case.folder.join("d.sf"), bytes).unwrap();
@@ -195,9 +195,9 @@ fn more_than_the_device_can_hold() {
         refused(&case, &bake, 4, &["m.obj: ", &number, &limit.to_string(), "--lattice"]);
     }
     // Small enough as it is stored, too large in f32 while it is baked.
-    if 100 * 6 * 80 * 80 * 64 > limit {
-        let half = ["bake", "m.obj", "-o", "f.sf", "--lattice", "cube:100x80"];
-        refused(&case, &half, 4, &["m.obj: ", "245760000", &limit.to_string(), "--lattice"]);
+    if 100 * 6 * 81 * 81 * 64 > limit {
+        let half = ["bake", "m.obj", "-o", "f.sf", "--lattice", "cube:100x81"];
+        refused(&case, &half, 4, &["m.obj: ", "251942400", &limit.to_string(), "--lattice"]);
     }
     // A picture beyond any device's memory or image size, or beyond what the host has left.
     let small = ["--lattice", "cube:1x1", "--face-px", "4"];
@@ -266,9 +266,9 @@ fn usage() {
         ("--size", "0x10", "1280x720"),
         ("--size", "-1x10", "1280x720"),
         ("--lattice", "many", "cube:18x7"),
-        ("--lattice", "cube:0x4", "at least 1"),
+        ("--lattice", "cube:0x5", "at least 1"),
         ("--lattice", "cube:99999999x99999999", "4000000"),
-        ("--lattice", "cube:4x4,inner=9,outer=2", "9"),
+        ("--lattice", "cube:4x5,inner=9,outer=2", "9"),
         ("--face-px", "2", "4..=1024"),
         ("--bands", "8", "2..=7"),
         ("--storage", "f8", "f16"),

@@ -166,7 +166,7 @@ fn the_barrier_of_a_bake_batch_is_missed() {
     let Some(gpu) = gpu() else { return };
     let mesh = generate::sphere(1.0, 1);
     for kind in [FieldKind::Occlusion, FieldKind::Radiance] {
-        let options = bake::Options { lattice: "cube:2x2".parse().unwrap(), face_px: 16, ..Default::default() };
+        let options = bake::Options { lattice: "cube:2x3".parse().unwrap(), face_px: 16, ..Default::default() };
         let bake = || {
             let header = bake::header(&mesh, kind, &options);
             Baker::new(&gpu.device, &library()).field(&mesh, header, &|_, _| ())

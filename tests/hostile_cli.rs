@@ -16,7 +16,7 @@ use std::process::Command;
 use tempfile::TempDir;
 
 const TRIANGLE: &str = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n";
-const SMALL: [&str; 4] = ["--lattice", "cube:2x2", "--face-px", "4"];
+const SMALL: [&str; 4] = ["--lattice", "cube:2x3", "--face-px", "4"];
 
 fn folder() -> TempDir {
     let folder = tempfile::tempdir().unwrap();
@@ -162,7 +162,7 @@ fn numbers_beyond_their_limits_are_usage() {
     for (arguments, part) in [
         (&["render", "sphere_over_plane", "-o", "p.png", "--time", "1e300"][..], "1e9"),
         (&["render", "sphere_over_plane", "-o", "p.png", "--time", "-1.1e9"], "1e9"),
-        (&["bake", "m.obj", "-o", "f.sf", "--lattice", "cube:2x2,outer=0.1"], "0.25 to 0.1"),
+        (&["bake", "m.obj", "-o", "f.sf", "--lattice", "cube:2x3,outer=0.1"], "0.25 to 0.1"),
     ] {
         let ran = run(&folder, arguments);
         assert!(ran.code == 2 && ran.stderr.contains(part), "{arguments:?}: {} {}", ran.code, ran.stderr);

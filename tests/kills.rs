@@ -32,13 +32,13 @@ const COMMANDS: [(&str, &[&str]); 8] = [
     ("bake m.obj -o f.sf --lattice cube:3x3 --face-px 8", &["f.sf"]),
     ("bake m.obj -o s.sf --silhouette --quality draft", &["s.sf"]),
     (
-        "render scene.toml -o p.png --exr p.exr --vertices v.csv --variant storage --lattice cube:2x2 --face-px 4 \
+        "render scene.toml -o p.png --exr p.exr --vertices v.csv --variant storage --lattice cube:2x3 --face-px 4 \
          --quality draft",
         &["p.png", "p.exr", "v.csv"],
     ),
-    ("render scene.toml -o a.png --frames 4 --variant storage --lattice cube:2x2 --face-px 4 --lights sh", &["a.png"]),
+    ("render scene.toml -o a.png --frames 4 --variant storage --lattice cube:2x3 --face-px 4 --lights sh", &["a.png"]),
     (
-        "render scene.toml -o n##.png --frames 3 --size 16x16 --variant storage --lattice cube:2x2 --face-px 4 --lights sh",
+        "render scene.toml -o n##.png --frames 3 --size 16x16 --variant storage --lattice cube:2x3 --face-px 4 --lights sh",
         &["n00.png", "n01.png", "n02.png"],
     ),
     ("import t.gltf -o i.toml", &["i.toml"]),

@@ -157,13 +157,7 @@ fn merging() -> Vec<ShaderPermutation> {
             ..usual
         });
     }
-    let lattices = [
-        "cube:16x8,linear,raw,inner=0.25",
-        "cube:1x1,inner=1.02",
-        "latlon:8x4x4,linear,raw,inner=0.2",
-        "latlon:1x1x1,inner=1.02",
-    ];
-    permutations.extend(lattices.map(|text| MergePermutation { lattice: lattice(text), ..usual }));
+    permutations.push(MergePermutation { lattice: lattice("cube:1x1,inner=1.02"), ..usual });
     permutations.push(MergePermutation { lights: false, ..usual });
     permutations.push(MergePermutation { sheets: false, ..usual });
     permutations.push(MergePermutation { gloss: true, ..usual });
@@ -174,7 +168,7 @@ fn merging() -> Vec<ShaderPermutation> {
     }));
     permutations.push(MergePermutation {
         variant: Variant::named("texel-shifted").unwrap(),
-        lattice: lattice("latlon:8x4x4,linear,raw,inner=0.2"),
+        lattice: lattice("cube:8x3"),
         ..usual
     });
     permutations.iter().map(MergePermutation::row).collect()

@@ -102,7 +102,7 @@ fn frames_neither_drift_nor_take_more_memory() {
     let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("fields-soak");
     let scene = Scene::parse(SCENE, Path::new("soak.toml"), &shadow_fields::asset::embedded::read).unwrap();
     let options = frame::Options {
-        bake: bake::Options { lattice: "cube:6x4".parse().unwrap(), face_px: 16, ..Default::default() },
+        bake: bake::Options { lattice: "cube:6x5".parse().unwrap(), face_px: 16, ..Default::default() },
         skip: Skip::ALL,
         size: [SIZE_PX; 2],
         antialias: Antialias::Outlines,

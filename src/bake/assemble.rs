@@ -5,7 +5,7 @@
 //! Input: `captured`, floats of one sample after another. Output: the field's payload at a byte offset of `field`.
 
 use crate::error::{Error, Result};
-use crate::field::lattice::{Directions, Lattice};
+use crate::field::lattice::Lattice;
 use crate::field::quantity::Storage;
 use crate::gpu::{Bind, Buffer, Commands, ComputePipeline, Device};
 use crate::shaders::{Library, ShaderPermutation};
@@ -98,10 +98,8 @@ fn fit(lattice: &Lattice, inside: &[bool], sample: u32) -> BTreeMap<u32, f64> {
 const FEWEST: u32 = 4;
 
 /// Pairs of samples between which a sample lies: the shells below and above, and the neighbours on both sides along
-/// both axes of a cube's grid. Grids of latitudes and longitudes are lowered by nothing, since they exist to compare
-/// with earlier work.
+/// both axes of a face.
 fn opposite(lattice: &Lattice, sample: u32) -> Vec<[u32; 2]> {
-    let Directions::Cube { cells } = lattice.directions else { return Vec::new() };
     let directions = lattice.direction_count();
     let shell = sample / directions;
     let direction = sample % directions;
@@ -109,7 +107,7 @@ fn opposite(lattice: &Lattice, sample: u32) -> Vec<[u32; 2]> {
     if lattice.shells >= FEWEST && shell > 0 && shell + 1 < lattice.shells {
         out.push([sample - directions, sample + directions]);
     }
-    if cells >= FEWEST {
+    if lattice.cells >= FEWEST {
         let around = lattice.cell_neighbours(direction).into_iter().map(|d| shell * directions + d).collect::<Vec<_>>();
         out.extend(around.chunks_exact(2).map(|pair| [pair[0], pair[1]]));
     }
@@ -141,21 +139,8 @@ fn neighbours(lattice: &Lattice, sample: u32) -> Vec<u32> {
     let directions = lattice.direction_count();
     let shell = sample / directions;
     let direction = sample % directions;
-    let mut out: Vec<u32> = match lattice.directions {
-        Directions::Cube { .. } => lattice.cell_neighbours(direction),
-        Directions::LatLon { latitudes, longitudes } => {
-            let y = direction / longitudes;
-            let x = direction % longitudes;
-            let mut around =
-                vec![y * longitudes + (x + 1) % longitudes, y * longitudes + (x + longitudes - 1) % longitudes];
-            around.extend((y > 0).then(|| direction - longitudes));
-            around.extend((y + 1 < latitudes).then(|| direction + longitudes));
-            around
-        }
-    }
-    .into_iter()
-    .map(|d| shell * directions + d)
-    .collect();
+    let around = lattice.cell_neighbours(direction);
+    let mut out: Vec<u32> = around.into_iter().map(|d| shell * directions + d).collect();
     out.extend((shell > 0).then(|| sample - directions));
     out.extend((shell + 1 < lattice.shells).then(|| sample + directions));
     out

@@ -4,9 +4,9 @@
 //!
 //! | quality | lattice | face | bands | format |
 //! |---|---|---|---|---|
-//! | draft | cube:8x4 | 32 px | 3 | f16 |
+//! | draft | cube:8x3,edges=auto | 32 px | 3 | f16 |
 //! | normal | cube:18x7,edges=auto | 64 px | 4 | f16 |
-//! | high | cube:24x10 | 128 px | 5 | f16 |
+//! | high | cube:24x9,edges=auto | 128 px | 5 | f16 |
 //!
 //! Times, bytes and errors are in `docs/measured.md`. More samples do not help small lights in bands: the number
 //! of bands limits them.
@@ -144,13 +144,13 @@ pub fn header(mesh: &Mesh, kind: FieldKind, options: &Options) -> FieldHeader {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
 pub enum Quality {
-    /// A tenth of the time and a seventh of the bytes; light in bands has 1.2 to 1.7 times the error: cube:8x4, 32 px,
+    /// A tenth of the time and a seventh of the bytes; light in bands has 1.2 to 1.7 times the error: cube:8x3,edges=auto, 32 px,
     /// 3 bands
     Draft,
     /// The default: cube:18x7,edges=auto, 64 px, 4 bands
     #[default]
     Normal,
-    /// 5 times the time and 4 times the bytes; light in bands has 0.54 to 0.84 of the error: cube:24x10, 128 px, 5
+    /// 5 times the time and 4 times the bytes; light in bands has 0.54 to 0.84 of the error: cube:24x9,edges=auto, 128 px, 5
     /// bands
     High,
 }
@@ -162,7 +162,7 @@ impl Quality {
         let lattice = |text: &str| text.parse().expect("a lattice of the table");
         match self {
             Quality::Draft => Options {
-                lattice: lattice("cube:8x4"),
+                lattice: lattice("cube:8x3,edges=auto"),
                 face_px: 32,
                 bands: 3,
                 silhouette: silhouettes(4),
@@ -171,7 +171,7 @@ impl Quality {
             },
             Quality::Normal => normal,
             Quality::High => Options {
-                lattice: lattice("cube:24x10"),
+                lattice: lattice("cube:24x9,edges=auto"),
                 face_px: 128,
                 bands: 5,
                 silhouette: silhouettes(16),

@@ -11,10 +11,10 @@ pub struct BakeOptions {
     /// How finely fields are sampled and stored
     #[cfg_attr(feature = "cli", arg(long, value_enum, default_value = "normal", value_name = "QUALITY"))]
     pub quality: Quality,
-    /// Sample points in place of the quality's: cube:SHELLSxCELLS or latlon:SHELLSxLATITUDESxLONGITUDES. Words may
-    /// follow after commas: linear,raw (equal steps between shells, as in the paper), inner=R, outer=R (in bounding
-    /// radii), round (no fit to the mesh's box), edges (samples on the edges of cube faces: finer steps in as many
-    /// bytes, not for boxes), edges=auto (the mesh decides). Example: cube:18x7,edges=auto
+    /// Sample points in place of the quality's: cube:SHELLSxCELLS, with an odd number of cells. Words may follow after
+    /// commas: inner=R, outer=R (in bounding radii), round (no fit to the mesh's box), edges (samples on the edges of
+    /// cube faces: finer steps in as many bytes, not for boxes), edges=auto (the mesh decides). Example:
+    /// cube:18x7,edges=auto
     #[cfg_attr(feature = "cli", arg(long, value_name = "LATTICE"))]
     pub lattice: Option<Lattice>,
     /// Edge of a captured cube face in texels, in place of the quality's

@@ -16,7 +16,7 @@ pub const F16: f64 = 2e-3;
 
 /// Lattice, bands and channels that are tried.
 pub const CASES: [(&str, usize, usize); 3] =
-    [("cube:3x4,inner=0.3", 4, 1), ("latlon:2x3x5,inner=0.3", 3, 3), ("cube:1x1", 2, 3)];
+    [("cube:3x5,inner=0.3", 4, 1), ("cube:3x5,edges,inner=0.3", 3, 3), ("cube:1x1", 2, 3)];
 
 /// Assembles random numbers, some of them inside the solid. The largest error relative to 1 + what is wanted; infinite
 /// where anything was written outside the field.

@@ -3,7 +3,7 @@
 use super::lattice::Lattice;
 use crate::sh::cube;
 use glam::DVec3;
-use std::f64::consts::{PI, TAU};
+use std::f64::consts::PI;
 
 /// Cells of a cube face have (almost) equal angles: cell coordinate u = s (c0 + c1 s^2 + c2 s^4) for s in [-1, 1]. This
 /// approximates (4/pi) atan(s) within 4.3e-3, with equal value at 1 and equal slope at 0 and 1; a shader evaluates it
@@ -14,24 +14,6 @@ pub const CELL_WARP: [f64; 3] = {
     let c2 = (slope_1 - slope_0 - 3.0 * (1.0 - slope_0)) / 2.0;
     [slope_0, 1.0 - slope_0 - c2, c2]
 };
-
-/// How the directions of one shell are arranged.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Directions {
-    /// `cells` x `cells` on each of six cube faces.
-    Cube {
-        /// Cells along a face edge.
-        cells: u32,
-    },
-    /// Rings of equal latitude with equal steps of longitude, as in early implementations of the method.
-    LatLon {
-        /// Rings; ring i lies at polar angle (i + 1/2) pi / latitudes from +y.
-        latitudes: u32,
-        /// Points on a ring; point j lies at azimuth 2 pi j / longitudes, counted from +x towards +z.
-        longitudes: u32,
-    },
-}
 
 /// Cell coordinate in [-1, 1] of face coordinate s in [-1, 1].
 pub fn warp(s: f64) -> f64 {
@@ -64,33 +46,20 @@ fn node_at(s: f64, columns: u32) -> f64 {
     (warp(s) + 1.0) / 2.0 * f64::from(columns - 1)
 }
 
-/// Four cells of a shell, and a position between them.
-pub(super) struct ShellCells {
-    pub base: u32,
-    pub columns: u32,
-    pub x: [u32; 2],
-    pub y: [u32; 2],
-    pub fraction: [f64; 2],
-}
-
 impl Lattice {
     /// Whether samples lie on the edges of a cube's faces.
     pub fn has_edges(&self) -> bool {
-        self.edges == Some(true) && matches!(self.directions, Directions::Cube { .. })
+        self.edges == Some(true)
     }
 
     /// Captured directions along a row of a cube's face.
     fn columns(&self) -> u32 {
-        let Directions::Cube { cells } = self.directions else { unreachable!("only cubes have cells") };
-        if self.has_edges() { cells + 2 } else { cells }
+        if self.has_edges() { self.cells + 2 } else { self.cells }
     }
 
     /// Number of directions of one shell; a direction that several faces share counts once per face.
     pub fn direction_count(&self) -> u32 {
-        match self.directions {
-            Directions::Cube { .. } => 6 * self.columns() * self.columns(),
-            Directions::LatLon { latitudes, longitudes } => latitudes * longitudes,
-        }
+        6 * self.columns() * self.columns()
     }
 
     /// The first index of the direction with this index: a direction that several faces share has several indices.
@@ -141,43 +110,28 @@ impl Lattice {
 
     /// Number of stored directions of one shell, including borders.
     pub fn stored_direction_count(&self) -> u32 {
-        match self.directions {
-            Directions::Cube { cells } => 6 * (cells + 2) * (cells + 2),
-            Directions::LatLon { .. } => self.direction_count(),
-        }
+        6 * (self.cells + 2) * (self.cells + 2)
     }
 
     /// Unit direction of the `index`-th captured sample of a shell, in the lattice's space.
     pub fn direction(&self, index: u32) -> DVec3 {
-        match self.directions {
-            Directions::Cube { cells } if self.has_edges() => {
-                let index = self.first_of(index);
-                let columns = cells + 2;
-                let st = |i: u32| node_st(i, columns);
-                let face = (index / (columns * columns)) as usize;
-                cube::direction(face, st(index % columns), st(index / columns % columns))
-            }
-            Directions::Cube { cells } => {
-                let face = index / (cells * cells);
-                let cell = index % (cells * cells);
-                let st = |i: u32| unwarp((f64::from(i) + 0.5) / f64::from(cells) * 2.0 - 1.0);
-                cube::direction(face as usize, st(cell % cells), st(cell / cells))
-            }
-            Directions::LatLon { latitudes, longitudes } => {
-                let polar = (f64::from(index / longitudes) + 0.5) * PI / f64::from(latitudes);
-                let azimuth = f64::from(index % longitudes) * TAU / f64::from(longitudes);
-                DVec3::new(polar.sin() * azimuth.cos(), polar.cos(), polar.sin() * azimuth.sin())
-            }
-        }
+        let columns = self.columns();
+        let index = self.first_of(index);
+        let st = |i: u32| match self.has_edges() {
+            true => node_st(i, columns),
+            false => unwarp((f64::from(i) + 0.5) / f64::from(columns) * 2.0 - 1.0),
+        };
+        let face = (index / (columns * columns)) as usize;
+        cube::direction(face, st(index % columns), st(index / columns % columns))
     }
 
-    /// For every stored direction, the captured directions of which it is the mean: one for a cell, one for a border,
-    /// three for a corner of a border.
+    /// For every stored direction, the captured directions of which it is the mean: one, but on an edge between cells
+    /// the two beside it, and in a corner of the cube three.
     pub fn sources(&self) -> Vec<Vec<u32>> {
-        let (Directions::Cube { cells }, false) = (self.directions, self.has_edges()) else {
+        if self.has_edges() {
             return (0..self.direction_count()).map(|i| vec![self.first_of(i)]).collect();
-        };
-        let n = i64::from(cells);
+        }
+        let n = i64::from(self.cells);
         let mut out = Vec::with_capacity(self.stored_direction_count() as usize);
         for face in 0..6 {
             for y in -1..=n {
@@ -191,7 +145,7 @@ impl Lattice {
                             self.neighbour(face, x, inside_y),
                             self.neighbour(face, inside_x, y),
                         ],
-                        _ => vec![self.neighbour(face, x, y)],
+                        _ => vec![self.cell_index(face, inside_x, inside_y), self.neighbour(face, x, y)],
                     });
                 }
             }
@@ -221,13 +175,12 @@ impl Lattice {
     }
 
     fn cell_index(&self, face: u32, x: i64, y: i64) -> u32 {
-        let Directions::Cube { cells } = self.directions else { unreachable!("only cubes have cells") };
-        (face * cells + y as u32) * cells + x as u32
+        (face * self.cells + y as u32) * self.cells + x as u32
     }
 
     /// The captured direction that lies one cell beyond the edge of `face`, where exactly one of x and y is outside.
     fn neighbour(&self, face: u32, x: i64, y: i64) -> u32 {
-        let Directions::Cube { cells } = self.directions else { unreachable!("only cubes have cells") };
+        let cells = self.cells;
         let n = i64::from(cells);
         // Projection of a point just beyond the edge finds the other face's cell.
         let st = |i: i64| match i {
@@ -240,43 +193,18 @@ impl Lattice {
         self.cell_index(other as u32, cell(s), cell(t))
     }
 
-    /// The four cells around a direction within one shell.
-    pub(super) fn plane(&self, direction: DVec3) -> ShellCells {
-        match self.directions {
-            Directions::Cube { cells } => {
-                let (face, s, t) = cube::face_st(direction);
-                // Half a row in cells; without borders if those belong to other faces.
-                let half = f64::from(if self.has_edges() { cells + 1 } else { cells }) / 2.0;
-                let place = |s: f64| warp(s) * half + f64::from(cells + 1) / 2.0;
-                let x = place(s);
-                let y = place(t);
-                // Rounding may give cells + 1/2 exactly; the index must stay inside the stored rows.
-                let low = |x: f64| (x.floor() as u32).min(cells);
-                let x0 = low(x);
-                let y0 = low(y);
-                ShellCells {
-                    base: face as u32 * (cells + 2) * (cells + 2),
-                    columns: cells + 2,
-                    x: [x0, x0 + 1],
-                    y: [y0, y0 + 1],
-                    fraction: [x - f64::from(x0), y - f64::from(y0)],
-                }
+    /// The face that a direction meets, and its place among the face's stored samples: 0 to cells + 1.
+    pub(super) fn place(&self, direction: DVec3) -> (u32, [f64; 2]) {
+        let (face, s, t) = cube::face_st(direction);
+        let cells = f64::from(self.cells);
+        let place = |s: f64| {
+            if self.has_edges() {
+                return (warp(s) + 1.0) / 2.0 * (cells + 1.0);
             }
-            Directions::LatLon { latitudes, longitudes } => {
-                let polar = direction.y.clamp(-1.0, 1.0).acos() / PI * f64::from(latitudes) - 0.5;
-                let azimuth = (direction.z.atan2(direction.x) / TAU).rem_euclid(1.0) * f64::from(longitudes);
-                let y = polar.clamp(0.0, f64::from(latitudes - 1));
-                let x = azimuth;
-                let x0 = x.floor() as u32;
-                let y0 = (y.floor() as u32).min(latitudes.saturating_sub(2));
-                ShellCells {
-                    base: 0,
-                    columns: longitudes,
-                    x: [x0 % longitudes, (x0 + 1) % longitudes],
-                    y: [y0, (y0 + 1).min(latitudes - 1)],
-                    fraction: [x - f64::from(x0), y - f64::from(y0)],
-                }
-            }
-        }
+            // The outermost steps are half as wide, and count as whole ones.
+            let at = (warp(s) * cells + cells + 1.0) / 2.0;
+            at + (at - 1.0).min(0.0) + (at - cells).max(0.0)
+        };
+        (face as u32, [place(s), place(t)])
     }
 }

@@ -1,6 +1,5 @@
 //! The directions around its object in which a field is not zero.
 
-use super::lattice::Directions;
 use super::{ShadowField, quantity::FieldKind};
 use crate::sh::basis::coefficient_count;
 use glam::DVec3;
@@ -36,7 +35,7 @@ pub fn extent(field: &ShadowField) -> Extent {
         .sources()
         .iter()
         .enumerate()
-        // A corner of a border is the mean of three cells, which are tested themselves.
+        // Means are of cells that are tested themselves.
         .filter(|(_, cells)| cells.len() == 1)
         .filter(|(at, _)| (0..lattice.shells).any(|shell| holds(shell * stored + *at as u32)))
         .map(|(_, cells)| cells[0])
@@ -50,15 +49,9 @@ pub fn extent(field: &ShadowField) -> Extent {
         return Extent::All;
     }
     // A sample affects lookups within one step along either axis; twice the longer step exceeds the diagonal.
-    let reach_rad = |direction: u32| match lattice.directions {
-        Directions::Cube { .. } => {
-            let steps = lattice.cell_neighbours(direction).into_iter().map(|n| at(n).angle_between(at(direction)));
-            2.0 * steps.fold(0.0, f64::max)
-        }
-        // The transform to the object's frame enlarges an angle by at most the largest stretch factor.
-        Directions::LatLon { latitudes, longitudes } => {
-            2.0 * fit.largest() * (PI / f64::from(latitudes)).max(2.0 * PI / f64::from(longitudes))
-        }
+    let reach_rad = |direction: u32| {
+        let steps = lattice.cell_neighbours(direction).into_iter().map(|n| at(n).angle_between(at(direction)));
+        2.0 * steps.fold(0.0, f64::max)
     };
     let half_angle_rad = lit.iter().map(|&d| at(d).angle_between(axis) + reach_rad(d)).fold(0.0, f64::max);
     if half_angle_rad < PI { Extent::Cone { axis, half_angle_rad } } else { Extent::All }

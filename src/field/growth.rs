@@ -29,7 +29,7 @@ pub fn growth(field: &ShadowField) -> f64 {
     let bands = header.bands;
     let tensor = Tensor::new(TRANSFER_BANDS, bands, TRANSFER_BANDS);
     let directions = lattice.stored_direction_count();
-    // Border samples of a cube's face are copies of other faces' samples, except corners, which are means.
+    // Samples on the edges of a cube's face are another face's too.
     let sources = lattice.sources();
     let mut seen = vec![false; lattice.direction_count() as usize];
     let own = |of: &Vec<u32>| of.len() > 1 || !std::mem::replace(&mut seen[of[0] as usize], true);
@@ -188,7 +188,7 @@ mod tests {
     /// u of the neighbouring shells is not the sample's own.
     #[test]
     fn more_stored_bands_grow_less() {
-        let lattice = "cube:24x2,inner=1.3".parse().expect("a lattice");
+        let lattice = "cube:24x3,inner=1.3".parse().expect("a lattice");
         let [four, five, seven] = [4, 5, 7].map(|bands| growth(&ball_of(bands, lattice)));
         assert!(four > five && five > seven && four > 1.03 && seven < 1.02, "{four} {five} {seven}");
     }

@@ -146,11 +146,8 @@ impl ShadowField {
         let corners = lattice.corners(position);
         let unscale = lattice.unscale(lattice.distance(position));
         for (coefficient, value) in out.iter_mut().enumerate().take(coefficient_count(self.header.bands)) {
-            *value = (0..8)
-                .filter(|&k| corners.weight[k] != 0.0)
-                .map(|k| corners.weight[k] * self.stored(corners.index[k], channel, coefficient))
-                .sum::<f64>()
-                * unscale;
+            let at = |(index, weight): (u32, f64)| weight * self.stored(index, channel, coefficient);
+            *value = corners.index.into_iter().zip(corners.weight).map(at).sum::<f64>() * unscale;
         }
     }
 }

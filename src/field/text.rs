@@ -1,23 +1,12 @@
 //! Text form of lattices, which the command line parses and prints.
 
 use super::Fit;
-use super::lattice::{AUTOMATIC, Directions, Lattice, Spacing};
+use super::lattice::{AUTOMATIC, Lattice};
 
 impl std::fmt::Display for Lattice {
     /// Writes the text that parsing accepts.
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        match self.directions {
-            Directions::Cube { cells } => write!(f, "cube:{}x{cells}", self.shells)?,
-            Directions::LatLon { latitudes, longitudes } => {
-                write!(f, "latlon:{}x{latitudes}x{longitudes}", self.shells)?;
-            }
-        }
-        let spacing = match self.spacing {
-            Spacing::Chord => "chord",
-            Spacing::Linear => "linear",
-        };
-        let stored = if self.scaled { "scaled" } else { "raw" };
-        write!(f, ",{spacing},{stored}")?;
+        write!(f, "cube:{}x{}", self.shells, self.cells)?;
         if self.inner != AUTOMATIC {
             write!(f, ",inner={}", self.inner)?;
         }
@@ -39,25 +28,20 @@ impl std::fmt::Display for Lattice {
 impl std::str::FromStr for Lattice {
     type Err = String;
 
-    /// `cube:SHELLSxCELLS` or `latlon:SHELLSxLATITUDESxLONGITUDES`, then `,chord,scaled` or `,linear,raw`, and any of
-    /// `,inner=R` `,outer=R` `,edges` `,edges=auto` `,round`, or `,centre=X:Y:Z` and `,stretch=X:Y:Z`.
+    /// `cube:SHELLSxCELLS`, then any of `,inner=R` `,outer=R` `,edges` `,edges=auto` `,round`, or `,centre=X:Y:Z` and
+    /// `,stretch=X:Y:Z`.
     fn from_str(text: &str) -> std::result::Result<Self, String> {
         let explain = || {
             format!(
-                "cannot read lattice \"{text}\": expected cube:18x7 or latlon:8x4x4, then any of ,linear,raw ,inner=R \
-                 ,outer=R ,edges ,edges=auto ,round"
+                "cannot read lattice \"{text}\": expected cube:18x7, then any of ,inner=R ,outer=R ,edges ,edges=auto ,round"
             )
         };
         let mut words = text.split(',');
-        let (kind, counts) = words.next().and_then(|w| w.split_once(':')).ok_or_else(explain)?;
-        let counts: Vec<u32> =
-            counts.split('x').map(str::parse).collect::<std::result::Result<_, _>>().map_err(|_| explain())?;
-        let mut lattice = Lattice { edges: Some(false), ..Lattice::default() };
-        (lattice.shells, lattice.directions) = match (kind, &counts[..]) {
-            ("cube", &[shells, cells]) => (shells, Directions::Cube { cells }),
-            ("latlon", &[shells, latitudes, longitudes]) => (shells, Directions::LatLon { latitudes, longitudes }),
-            _ => return Err(explain()),
-        };
+        let counts = words.next().and_then(|word| word.strip_prefix("cube:")).and_then(|counts| counts.split_once('x'));
+        let count = |text: &str| text.parse::<u32>().map_err(|_| explain());
+        let (shells, cells) = counts.ok_or_else(explain)?;
+        let mut lattice =
+            Lattice { shells: count(shells)?, cells: count(cells)?, edges: Some(false), ..Lattice::default() };
         for word in words {
             match word.split_once('=') {
                 Some(("edges", "auto")) => lattice.edges = None,
@@ -70,10 +54,6 @@ impl std::str::FromStr for Lattice {
                     lattice.fit.get_or_insert(Fit::ROUND).stretch = triple(words).ok_or_else(explain)?;
                 }
                 _ => match word {
-                    "chord" => lattice.spacing = Spacing::Chord,
-                    "linear" => lattice.spacing = Spacing::Linear,
-                    "scaled" => lattice.scaled = true,
-                    "raw" => lattice.scaled = false,
                     "edges" => lattice.edges = Some(true),
                     "round" => lattice.fit = Some(Fit::ROUND),
                     _ => return Err(explain()),

@@ -1,7 +1,7 @@
 //! Variants of the merge shader that compute the same function, by name, and what else its code depends on.
 
 use crate::error::{Error, Result};
-use crate::field::lattice::{CELL_WARP, Directions, Lattice, Spacing};
+use crate::field::lattice::{CELL_WARP, Lattice};
 use crate::field::quantity::{Storage, channel_stride};
 use crate::field::sheet::CONTACT;
 use crate::gpu::Device;
@@ -131,12 +131,6 @@ impl MergePermutation {
 
     pub fn row(&self) -> ShaderPermutation {
         let lattice = self.lattice;
-        let (cells, latitudes, longitudes) = match lattice.directions {
-            // Unused sizes are 1: the shader's other side must compile too.
-            Directions::Cube { cells } => (cells, 1, 1),
-            Directions::LatLon { latitudes, longitudes } => (1, latitudes, longitudes),
-        };
-        let cube = matches!(lattice.directions, Directions::Cube { .. });
         let row = ShaderPermutation::new("merge.comp", self.bands)
             .field_bands(self.field_bands)
             .number("Y00", Y00)
@@ -159,18 +153,8 @@ impl MergePermutation {
             .number("CAP_SINE_LEAST", CAP_SINES[0])
             .number("CAP_SINE_MOST", CAP_SINES[1])
             .number("CAP_SPREAD", CAP_SPREAD)
-            .define(
-                "SPACING",
-                match lattice.spacing {
-                    Spacing::Chord => 0_u32,
-                    Spacing::Linear => 1,
-                },
-            )
             .define("SHELLS", lattice.shells)
-            .define("DIRECTIONS", !cube)
-            .define("CELLS", cells)
-            .define("LATITUDES", latitudes)
-            .define("LONGITUDES", longitudes);
+            .define("CELLS", lattice.cells);
         let row = self.skip.merge_defines().fold(row, |row, (name, on)| row.define(name, on));
         ["WARP_0", "WARP_1", "WARP_2"]
             .into_iter()

@@ -87,7 +87,7 @@ const LIMITS: &[Row<fn(&mut ash::vk::PhysicalDeviceLimits)>] = &[
 
 fn picture(folder: &Path, more: &[&str]) -> shadow_fields::Result<()> {
     let variant = if more.contains(&"--variant") { &[][..] } else { &["--variant", "storage"] };
-    let small = ["--lattice", "cube:2x2", "--face-px", "4", "--quality", "draft"];
+    let small = ["--lattice", "cube:2x3", "--face-px", "4", "--quality", "draft"];
     let antialias = if more.contains(&"--antialias") { &[][..] } else { &["--antialias", "none"] };
     run(folder, &[&["render", "@scene.toml", "-o", "@p.png"], variant, antialias, &small, more].concat())
 }

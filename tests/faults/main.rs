@@ -54,7 +54,7 @@ motion = [{ spin = { period_s = 3 } }, { bob = { amplitude_m = 0.2, period_s = 1
 const MESH: &str = "v 0 0 0 1 0 0\nv 1 0 0 0 1 0\nv 0 1 0 0 0 1\nv 0 0 1 1 1 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 1 4 3\n";
 
 /// Few samples of few texels.
-const SMALL: [&str; 6] = ["--lattice", "cube:2x2", "--face-px", "4", "--quality", "draft"];
+const SMALL: [&str; 6] = ["--lattice", "cube:2x3", "--face-px", "4", "--quality", "draft"];
 
 /// Runs the program in the folder, as from the command line.
 fn run(folder: &Path, arguments: &[&str]) -> Result<()> {

@@ -92,7 +92,7 @@ pub fn show(viewer: &mut Viewer, draw: &mut dyn FnMut(&mut Viewer) -> Result<boo
 }
 
 fn frame_options() -> frame::Options {
-    let lattice = "cube:2x2".parse().expect("a lattice");
+    let lattice = "cube:2x3".parse().expect("a lattice");
     frame::Options {
         bake: bake::Options { lattice, face_px: 4, ..Default::default() },
         lights: Lights::Sharp,

@@ -29,7 +29,7 @@ fn field(kind: FieldKind, storage: Storage, lattice: &str, seed: u64) -> ShadowF
 }
 
 fn small() -> ShadowField {
-    field(FieldKind::Occlusion, Storage::F16, "latlon:2x2x2", 1)
+    field(FieldKind::Occlusion, Storage::F16, "cube:2x1", 1)
 }
 
 /// The refusal of a file: bad input, one line, that names the file.
@@ -50,9 +50,9 @@ fn entries(folder: &Path) -> Vec<String> {
 fn round_trip() {
     let folder = tempfile::tempdir().unwrap();
     for (i, (kind, storage, lattice)) in [
-        (FieldKind::Occlusion, Storage::F16, "cube:3x2,inner=1.02"),
-        (FieldKind::Occlusion, Storage::F32, "cube:3x2,linear,raw,inner=0.3,outer=5.5"),
-        (FieldKind::Radiance, Storage::F16, "latlon:3x4x5,linear,raw"),
+        (FieldKind::Occlusion, Storage::F16, "cube:3x3,inner=1.02"),
+        (FieldKind::Occlusion, Storage::F32, "cube:3x3,edges,inner=0.3,outer=5.5"),
+        (FieldKind::Radiance, Storage::F16, "cube:3x5"),
         (FieldKind::Radiance, Storage::F32, "cube:1x1"),
     ]
     .into_iter()
@@ -71,7 +71,7 @@ fn round_trip() {
 #[test]
 fn stored_numbers_have_their_format() {
     for storage in [Storage::F16, Storage::F32] {
-        let header = header(FieldKind::Radiance, storage, "latlon:2x2x2");
+        let header = header(FieldKind::Radiance, storage, "cube:2x1");
         let count = header.payload_bytes() as usize / storage.bytes();
         let payload = (0..count)
             .flat_map(|i| match storage {
@@ -166,15 +166,14 @@ fn headers_are_not_believed() {
     assert_eq!(ShadowField::read(&path).unwrap(), good);
 
     let lattice = |edit: &dyn Fn(&mut serde_json::Value)| json(&|header| edit(&mut header["lattice"]));
-    let huge = lattice(&|l| l["directions"] = serde_json::json!({"latlon": {"latitudes": 5000, "longitudes": 10_000}}));
-    let message = sealed(&path, &huge, &good.payload);
-    assert!(message.contains("100000000 samples"), "{message}");
-    let cells = |n: u32| lattice(&|l| l["directions"] = serde_json::json!({ "cube": { "cells": n } }));
-    for n in [u32::MAX, 1 << 31, 3_037_000_500, 0] {
+    let cells = |n: u32| lattice(&|l| l["cells"] = n.into());
+    let message = sealed(&path, &cells(4083), &good.payload);
+    assert!(message.contains("200050668 samples"), "{message}");
+    for n in [u32::MAX, (1 << 31) + 1, 3_037_000_501, 4, 0] {
         sealed(&path, &cells(n), &good.payload);
     }
     // Within every limit, but not what the payload holds.
-    assert!(sealed(&path, &cells(500), &good.payload).contains("claims"));
+    assert!(sealed(&path, &cells(501), &good.payload).contains("claims"));
     assert!(sealed(&path, &json(&|_| ()), &good.payload[1..]).contains("claims"));
     assert!(sealed(&path, &json(&|_| ()), &[]).contains("claims"));
 
@@ -205,24 +204,10 @@ fn headers_are_not_believed() {
     }
 }
 
-/// Files of spacings that a lattice had once are refused by name, and the headers of the others are what they were:
-/// names in the cache are hashes of them.
+/// Names in the cache are hashes of headers.
 #[test]
-fn spacings_that_went_are_refused() {
-    let folder = tempfile::tempdir().unwrap();
-    let path = folder.path().join("old.sf");
-    let good = small();
-    let pair = |spacing: &str, scaled: bool| {
-        let mut header = serde_json::to_value(&good.header).unwrap();
-        (header["lattice"]["spacing"], header["lattice"]["scaled"]) = (spacing.into(), scaled.into());
-        sealed(&path, &header, &good.payload)
-    };
-    assert!(pair("log", true).contains("`log`, expected `chord` or `linear`"));
-    for (spacing, scaled) in [("chord", false), ("linear", true)] {
-        let said = pair(spacing, scaled);
-        assert!(said.contains("\"chord\" goes with \"scaled\"") && said.contains("baked anew"), "{said}");
-    }
-    let text = r#"{"shells":18,"inner":0.0,"outer":8.0,"spacing":"chord","directions":{"cube":{"cells":7}},"scaled":true,"fit":null,"edges":null}"#;
+fn headers_are_what_they_were() {
+    let text = r#"{"shells":18,"inner":0.0,"outer":8.0,"cells":7,"fit":null,"edges":null}"#;
     assert_eq!(serde_json::to_string(&Lattice::default()).unwrap(), text);
 }
 
@@ -279,7 +264,7 @@ fn a_read_only_folder_keeps_the_old_file() {
     small().write(&path).unwrap();
     let permit = |mode| std::fs::set_permissions(folder.path(), std::fs::Permissions::from_mode(mode)).unwrap();
     permit(0o555);
-    let other = field(FieldKind::Occlusion, Storage::F32, "latlon:2x2x2", 9);
+    let other = field(FieldKind::Occlusion, Storage::F32, "cube:2x1", 9);
     let outcome = other.write(&path);
     permit(0o755);
     // The superuser may write all the same; either way the file is whole and alone.
@@ -292,7 +277,7 @@ fn a_read_only_folder_keeps_the_old_file() {
 fn two_writers_and_a_reader_never_meet() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("shared.sf");
-    let fields = [1, 2].map(|seed| field(FieldKind::Radiance, Storage::F32, "cube:4x4,inner=1.02", seed));
+    let fields = [1, 2].map(|seed| field(FieldKind::Radiance, Storage::F32, "cube:4x5,inner=1.02", seed));
     fields[0].write(&path).unwrap();
     let done = AtomicBool::new(false);
     let reads = std::thread::scope(|scope| {

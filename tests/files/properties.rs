@@ -210,8 +210,8 @@ fn lookups_are_continuous() {
     let lattices = [
         "cube:6x5,inner=0.4",
         "cube:6x5,inner=0.4,centre=0.1:-0.2:0,stretch=1:1.5:1.25",
-        "cube:6x4,linear,raw,inner=0.5",
-        "cube:6x4,edges,inner=0.5",
+        "cube:6x7,inner=0.5",
+        "cube:6x5,edges,inner=0.5",
         "cube:6x3,inner=1.02",
     ];
     let fields: Vec<ShadowField> = (1..).zip(lattices).map(|(seed, text)| field(text.parse().unwrap(), seed)).collect();

@@ -29,8 +29,8 @@ fn field_of(kind: FieldKind, storage: Storage, lattice: &str) -> ShadowField {
 }
 
 pub fn fields() -> Vec<Vec<u8>> {
-    let one = field_of(FieldKind::Occlusion, Storage::F16, "cube:2x2");
-    let other = field_of(FieldKind::Radiance, Storage::F32, "latlon:2x2x2,linear,raw,inner=0.3,outer=5");
+    let one = field_of(FieldKind::Occlusion, Storage::F16, "cube:2x3");
+    let other = field_of(FieldKind::Radiance, Storage::F32, "cube:2x1,edges,inner=0.3,outer=5");
     [one, other].map(|field| written(|path| field.write(path).unwrap())).into()
 }
 

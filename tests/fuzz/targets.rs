@@ -54,8 +54,7 @@ pub const TARGETS: &[Target] = &[
         name: "lattice",
         seeds: lattices,
         tokens: "\
-            cube:|latlon:|x|,chord|,linear|,scaled|,raw|,inner=|,outer=|,edges|,edges=auto|,round|,centre=|\
-            ,stretch=|:",
+            cube:|x|,inner=|,outer=|,edges|,edges=auto|,round|,centre=|,stretch=|:",
         parse: lattice,
         reads_file: false,
     },
@@ -211,8 +210,8 @@ fn decode(bytes: &[u8]) -> Result<()> {
 fn lattices() -> Vec<Vec<u8>> {
     [
         "cube:18x7",
-        "latlon:8x4x4,linear,raw,inner=0.9,outer=5,edges",
-        "cube:2x2,round",
+        "cube:8x5,inner=0.9,outer=5,edges",
+        "cube:2x3,round",
         "cube:3x3,centre=0:1:0,stretch=1:1:2,edges=auto",
     ]
     .map(|text| text.into())
@@ -285,7 +284,7 @@ fn calibration(bytes: &[u8]) -> Result<()> {
 /// Arguments stand on lines.
 fn options() -> Vec<Vec<u8>> {
     [
-        "render\ns.toml\n-o\np.png\n--frames\n3\n--time\n1.5\n--size\n64x48\n--skip\nall\n--eps\n0.01\n--lattice\ncube:2x2",
+        "render\ns.toml\n-o\np.png\n--frames\n3\n--time\n1.5\n--size\n64x48\n--skip\nall\n--eps\n0.01\n--lattice\ncube:2x3",
         "bake\nm.obj\n-o\nf.sf\n--radiance\n1,0.5,0.2\n--quality\nhigh",
         "inspect\nf.sf\n--faces\nsheet.png",
         "bench\ntime-error\n--out\no\n--json",

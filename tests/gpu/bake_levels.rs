@@ -32,7 +32,7 @@ fn scanned(subdivisions: u32) -> Mesh {
 }
 
 fn options(levels: bool) -> bake::Options {
-    bake::Options { lattice: "cube:9x2".parse().unwrap(), storage: Storage::F32, levels, ..Default::default() }
+    bake::Options { lattice: "cube:9x3".parse().unwrap(), storage: Storage::F32, levels, ..Default::default() }
 }
 
 fn off(found: &[f32], wanted: &[f32]) -> f64 {

@@ -58,7 +58,7 @@ fn the_same_mesh_under_two_names_is_baked_once() {
 fn what_faces_of_the_lattice_share_is_captured_once() {
     let Some(gpu) = gpu() else { return };
     let mesh = generate::sphere(1.0, 2);
-    let header = header(&mesh, "cube:2x4,edges");
+    let header = header(&mesh, "cube:2x5,edges");
     let nodes = (header.lattice.direction_count() / 6).isqrt();
     let (field, report) = gpu.baker().field(&mesh, header, &|_, _| ()).unwrap();
     let places = 6 * (nodes - 2).pow(2) + 12 * (nodes - 2) + 8;
@@ -73,7 +73,7 @@ fn samples_inside_a_solid_are_captured_off_its_surface() {
     let Some(gpu) = gpu() else { return };
     let mesh = generate::torus(1.0, 0.3, 48, 24);
     let positions = unit_positions(&mesh);
-    let (field, found) = gpu.baker().field(&mesh, header(&mesh, "cube:12x8"), &|_, _| ()).unwrap();
+    let (field, found) = gpu.baker().field(&mesh, header(&mesh, "cube:12x7"), &|_, _| ()).unwrap();
     assert!(found.filled > 100, "{} samples inside", found.filled);
     let weights = cube::solid_angle(16);
     let mut sum = 0.0;

@@ -12,7 +12,7 @@ use stage::{at, difference, scene, small, stage};
 /// A denser lattice for comparisons with closed forms, f32.
 fn fine() -> frame::Options {
     frame::Options {
-        bake: bake::Options { lattice: "cube:12x6".parse().unwrap(), face_px: 32, ..small().bake },
+        bake: bake::Options { lattice: "cube:12x5".parse().unwrap(), face_px: 32, ..small().bake },
         ..small()
     }
 }

@@ -150,7 +150,7 @@ fn a_light_that_faces_away_is_left_off() {
     scene.meshes[1] = lamp.into();
     let placements = scene.at(0.0);
     // Fine directions: a cell more to either side counts as lit.
-    let bake = shadow_fields::bake::Options { lattice: "cube:6x12".parse().unwrap(), ..small().bake };
+    let bake = shadow_fields::bake::Options { lattice: "cube:6x11".parse().unwrap(), ..small().bake };
     let options = frame::Options { bake, ..small() };
     let mut with = stage.frame(&scene, options);
     // With a threshold of 0 the twin looks at everything, left off or not.
@@ -268,7 +268,7 @@ fn nothing_pops_as_fields_become_caps() {
              [[entity]]\nmesh = \"floor\"\n[[entity]]\nmesh = \"thing\"\n[[entity]]\nmesh = \"bulb\"\nemission = [9, 9, 9]\n",
         ));
         // Fine enough that what a lookup is off by does not hide what caps change.
-        let bake = shadow_fields::bake::Options { face_px: 32, lattice: "cube:12x8".parse().unwrap(), ..small().bake };
+        let bake = shadow_fields::bake::Options { face_px: 32, lattice: "cube:12x7".parse().unwrap(), ..small().bake };
         let options = frame::Options { bake, ..small() };
         let mut caps = stage.frame(&scene, options);
         let mut fields = stage.frame(&scene, frame::Options { skip: Skip::without("caps"), ..options });
@@ -337,7 +337,7 @@ fn the_house_has_something_for_every_skip() {
     let Some(stage) = stage() else { return };
     let house = shadow_fields::bench::house::scene().unwrap();
     // Fine directions, as for the lamp above.
-    let bake = shadow_fields::bake::Options { lattice: "cube:6x12".parse().unwrap(), ..small().bake };
+    let bake = shadow_fields::bake::Options { lattice: "cube:6x11".parse().unwrap(), ..small().bake };
     let options = frame::Options { bake, eps: 1e-3, ..small() };
     let placements = house.at(0.0);
     let mut frame = stage.frame(&house, options);

@@ -33,7 +33,7 @@ fn the_cache_finds_what_it_holds_and_replaces_what_is_damaged() {
     let Some(gpu) = gpu() else { return };
     let folder = tempfile::tempdir().unwrap();
     let mesh = torus();
-    let options = small("cube:10x4", Storage::F16, 4);
+    let options = small("cube:10x5", Storage::F16, 4);
     let fresh = || bake::header(&mesh, FieldKind::Occlusion, &options);
     let mut header = fresh();
     let (baked, bytes) = cached(&gpu.device, folder.path(), &mesh, &mut header);
@@ -91,7 +91,7 @@ fn the_cache_finds_what_it_holds_and_replaces_what_is_damaged() {
 fn a_file_under_another_name_is_not_believed() {
     let Some(gpu) = gpu() else { return };
     let folder = tempfile::tempdir().unwrap();
-    let options = small("cube:3x2,inner=1.02", Storage::F16, 4);
+    let options = small("cube:3x3,inner=1.02", Storage::F16, 4);
     let meshes = [torus(), generate::cuboid(Vec3::ONE, 2)];
     let run = |mesh: &Mesh| {
         let mut header = bake::header(mesh, FieldKind::Occlusion, &options);

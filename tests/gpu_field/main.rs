@@ -156,7 +156,7 @@ fn torus() -> Mesh {
 fn samples_in_the_tube_are_filled_from_outside() {
     let Some(gpu) = gpu() else { return };
     let mesh = torus();
-    let field = bake_field(&gpu.device, &mesh, FieldKind::Occlusion, &small("cube:10x4", Storage::F32, 4));
+    let field = bake_field(&gpu.device, &mesh, FieldKind::Occlusion, &small("cube:10x5", Storage::F32, 4));
     let header = &field.header;
     let lattice = header.lattice;
     let positions: Vec<DVec3> = (0..lattice.sample_count()).map(|i| lattice.position(i)).collect();
@@ -276,7 +276,7 @@ fn a_second_bake_has_the_same_bytes() {
 #[test]
 fn a_field_lands_at_its_place_in_a_scene() {
     let Some(gpu) = gpu() else { return };
-    let options = small("cube:3x2", Storage::F16, 4);
+    let options = small("cube:3x3", Storage::F16, 4);
     let mesh =
         |name: &str, shape: &str| format!("[[mesh]]\nname = \"{name}\"\n{shape}\n[[entity]]\nmesh = \"{name}\"\n");
     let text = [
@@ -307,7 +307,7 @@ fn a_field_lands_at_its_place_in_a_scene() {
 fn progress_is_told_up_to_the_end() {
     let Some(gpu) = gpu() else { return };
     let mesh = generate::sphere(1.0, 1);
-    let options = small("cube:3x4", Storage::F16, 4);
+    let options = small("cube:3x5", Storage::F16, 4);
     let header = bake::header(&mesh, FieldKind::Occlusion, &options);
     let told = std::cell::RefCell::new(Vec::new());
     let progress = |done, all| told.borrow_mut().push((done, all));
@@ -324,7 +324,7 @@ fn what_cannot_be_baked_is_bad_input() {
     let mesh = generate::sphere(1.0, 2);
     let baker = Baker::new(&gpu.device, &gpu.library);
     let refused = |edit: &dyn Fn(&mut FieldHeader)| {
-        let mut header = bake::header(&mesh, FieldKind::Occlusion, &small("cube:2x2", Storage::F16, 4));
+        let mut header = bake::header(&mesh, FieldKind::Occlusion, &small("cube:2x3", Storage::F16, 4));
         edit(&mut header);
         baker.field(&mesh, header, &quiet).map(|_| ()).expect_err("refused").exit_code()
     };

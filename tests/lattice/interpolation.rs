@@ -5,7 +5,6 @@ use crate::generate;
 use fastrand::Rng;
 use glam::DVec3;
 use shadow_fields::bake;
-use shadow_fields::field::lattice::Directions;
 use shadow_fields::field::{FieldHeader, FieldKind, Lattice, ShadowField, Storage};
 use shadow_fields::sh::quadrature::random_direction;
 use std::f64::consts::{PI, TAU};
@@ -72,8 +71,7 @@ fn linear_in_the_shell_coordinate_is_exact() {
 fn interpolation_is_continuous() {
     let mut rng = Rng::with_seed(6);
     for lattice in lattices() {
-        let Directions::Cube { cells } = lattice.directions else { continue };
-        let steps_of_row = if lattice.has_edges() { cells + 1 } else { cells };
+        let steps_of_row = if lattice.has_edges() { lattice.cells + 1 } else { lattice.cells };
         let stored = store(&lattice, &noise(&lattice, &mut rng));
         let (slope, offset) = lattice.radial_map();
         let last = f64::from(lattice.shells - 1);
@@ -127,37 +125,6 @@ fn interpolation_is_continuous() {
         // The test is worth something only where the bound is far below the noise.
         assert!(largest < 0.3, "{lattice}: a bound of {largest} would let a jump pass");
     }
-}
-
-#[test]
-fn longitudes_wrap() {
-    let mut rng = Rng::with_seed(7);
-    let lattice: Lattice = "latlon:4x5x7,inner=0.3".parse().unwrap();
-    let captured = noise(&lattice, &mut rng);
-    let stored = store(&lattice, &captured);
-    let at = |polar: f64, azimuth: f64| {
-        let p = DVec3::new(polar.sin() * azimuth.cos(), polar.cos(), polar.sin() * azimuth.sin());
-        interpolate(&lattice, &stored, 1.3 * p)
-    };
-    for polar in [0.2, 1.0, 1.6, 3.0] {
-        let count = 40_000;
-        let mut before = at(polar, 0.0);
-        for i in 1..=count {
-            let value = at(polar, TAU * f64::from(i) / f64::from(count));
-            // Seven cells around: a step is 7 / count of a cell, times the noise's range of 1.
-            assert!((value - before).abs() < 7.0 / f64::from(count) + 1e-9, "polar {polar}, step {i}");
-            before = value;
-        }
-        assert!((before - at(polar, 0.0)).abs() < 1e-9, "once around");
-    }
-    // Halfway between the last longitude and the first.
-    let ring = lattice.direction_count() + 2 * 7;
-    let inner_shell = lattice.shell(1);
-    let polar = 2.5 * PI / 5.0;
-    let azimuth = 6.5 * TAU / 7.0;
-    let p = DVec3::new(polar.sin() * azimuth.cos(), polar.cos(), polar.sin() * azimuth.sin());
-    let mean = (captured[ring as usize + 6] + captured[ring as usize]) / 2.0;
-    assert!((interpolate(&lattice, &stored, inner_shell * p) - mean).abs() < ROUNDING);
 }
 
 #[test]

@@ -145,12 +145,13 @@ vec2 through_box(uint field, vec3 point, vec3 direction) {
 
 // How far an outline counts that lies that far away: 0 behind the point or beyond the limit, 1 between them. Its
 // nearest point may lie off the ray, and the object then stands where the ray passes its box: all of it, where the ray
-// enters and leaves the box between point and limit.
+// enters and leaves the box between point and limit, with a ramp where the box reaches beyond either.
 float counts_between(float away, float limit, vec2 in_box) {
 #if BOXES
     bool apart = in_box[1] < TOUCHING || in_box[0] > limit - TOUCHING;
     away = min(max(away, in_box[0]), in_box[1]);
-    float begins = in_box[0] > -TOUCHING ? 1.0 : fade(away), ends = in_box[1] < limit + TOUCHING ? 1.0 : fade(limit - away);
+    float begins = max(fade(away), clamp(1.0 + in_box[0] / NEAREST, 0.0, 1.0));
+    float ends = max(fade(limit - away), clamp(1.0 - (in_box[1] - limit) / NEAREST, 0.0, 1.0));
     return apart ? 0.0 : begins * ends;
 #else
     return fade(away) * fade(limit - away);

@@ -372,12 +372,14 @@ impl SilhouetteField {
 
 /// How far an outline counts that lies that far away (in r): one behind the receiver or beyond the limit blocks
 /// nothing. Its nearest point may lie off the ray, as of a wide thin slab below the receiver, and the object then
-/// stands where the ray passes its box: all of it, where the ray enters and leaves the box between receiver and limit.
+/// stands where the ray passes its box: all of it, where the ray enters and leaves the box between receiver and limit,
+/// with a ramp where the box reaches beyond either.
 fn counts_between(away: f64, limit: f64, [enters, leaves]: [f64; 2]) -> f64 {
     let apart = leaves < TOUCHING || enters > limit - TOUCHING;
     let stands = away.max(enters).min(leaves);
-    let begins = if enters > -TOUCHING { 1.0 } else { fade(stands) };
-    let ends = if leaves < limit + TOUCHING { 1.0 } else { fade(limit - stands) };
+    let within = |beyond: f64| (1.0 - beyond / NEAREST).clamp(0.0, 1.0);
+    let begins = fade(stands).max(within(-enters));
+    let ends = fade(limit - stands).max(within(leaves - limit));
     if apart { 0.0 } else { begins * ends }
 }
 

@@ -20,10 +20,21 @@ const uint NONE = 0xffffffffu;
 #include "gloss_pixel.glsl"
 #endif
 
+#if OVER
+// A premultiplied colour over what is behind it, of which `opacity` is kept back.
+vec4 over(vec3 shown, float opacity) {
+#if DISPLAY
+    // Encoded colours are blended: with this alpha what is behind loses as much light.
+    opacity = 1.0 - pow(1.0 - opacity, 1.0 / 2.2);
+#endif
+    return vec4(shown, opacity);
+}
+#endif
+
 layout(push_constant) uniform Push {
     mat4 clip_from_object;
     vec4 emission_white; // w = radiance that is shown as white
-    float tag;
+    float tag; // opacity if OVER
 #if GLOSS
     uint entity;
 #endif
@@ -41,15 +52,29 @@ void main() {
         discard;
     }
     vec3 over_mean = push.paint.rgb * texel.rgb;
+#if OVER
+    over_mean *= texel.a;
+    float opacity = push.tag * texel.a;
+#endif
 #if GLOSS
     vec3 base = over_mean * within * tint * gloss_entity_at(push.entity).albedo;
     shown = glow(push.entity, within * shown, push.emission_white.rgb, within * uv);
     shown += glossy(push.entity, base, over_mean * within * light, within * uv, within);
+#if OVER
+    color = over(finish(shown, push.emission_white.w), opacity);
+#else
     color = vec4(finish(shown, push.emission_white.w), push.tag);
+#endif
     return;
 #else
     shown += over_mean * light;
 #endif
 #endif
+#if !OVER
     color = vec4(finish(within * shown, push.emission_white.w), push.tag);
+#elif PAINTED
+    color = over(finish(within * shown, push.emission_white.w), opacity);
+#else
+    color = over(finish(within * shown, push.emission_white.w), push.tag);
+#endif
 }

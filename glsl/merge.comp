@@ -99,7 +99,7 @@ void look(Vertex vertex, uint packed, float t_start[CHAIN], inout float t[CHAIN]
     entity.centre.xyz -= vertex.receiver;
     Cone cone = cone_of(entity.centre, vertex.position);
     float weight = above_horizon(cone, vertex.normal);
-    float counts = share(vertex, e, cone, l) * field_share(cone);
+    float counts = share(vertex, e, cone, l) * field_share(cone) * entity.opacity;
     weight *= shines ? 1.0 : counts;
     vec3 p = to_lattice(entity, to_object(entity, (vertex.position - entity.centre.xyz) * entity.centre.w));
     uint base = of_radiance ? entity.radiance_base + channel * CHANNEL_QUADS : entity.blocked_base;
@@ -147,7 +147,7 @@ void cover(Vertex vertex, uint packed, inout float t[CHAIN]) {
     float weight = above_horizon(cone, vertex.normal) * share(vertex, e, cone, (packed >> ENTRY_BITS) & SKY_CHAIN);
     float y[COEFFICIENTS];
     float solid_angle = cap_of(entity, cone, y);
-    chain_cover(t, y, weight * (1.0 - field_share(cone)) * solid_angle);
+    chain_cover(t, y, weight * (1.0 - field_share(cone)) * entity.opacity * solid_angle);
 }
 #endif
 
@@ -169,7 +169,7 @@ void take_sheet(Vertex vertex, uint packed, inout float t[CHAIN]) {
     Entity entity = ENTITY(packed & SKY_CHAIN);
     vec3 centre = entity.centre.xyz - vertex.receiver;
     Sheet sheet = sheet_of(entity, centre, vertex.position, vertex.normal, vertex.contact);
-    float weight = sheet_above_horizon(sheet, vertex.normal);
+    float weight = sheet_above_horizon(sheet, vertex.normal) * entity.opacity;
 #if LIGHTS
     uint l = packed >> ENTRY_BITS & SKY_CHAIN;
     vec4 light = ENTITY(l == SKY_CHAIN ? packed & SKY_CHAIN : l).centre;

@@ -182,7 +182,7 @@ vec4 let_through(Entity occluder, Surface surface, SeenLight light, Block block,
         blocked_by = mix(blocked_by, halves, inside);
     }
 #endif
-    return 1.0 - blocked_by;
+    return 1.0 - (before ? occluder.opacity : 1.0) * blocked_by;
 }
 
 // Irradiance by the parts of a block, unoccluded, of radiance 1.

@@ -53,7 +53,7 @@ void pass_sheet(inout SheetShadow shadow, Entity entity, Surface surface, SeenLi
         }
         vec3 edge = (h * (side < 2 ? sheet.axes[0] : sheet.axes[1]) - end * sheet.axes[2]) / off;
         edge = (side & 1) != 0 ? -edge : edge;
-        float free = 1.0 - counts * both(x, y, cosine), before = shadow.free[k];
+        float free = 1.0 - entity.opacity * counts * both(x, y, cosine), before = shadow.free[k];
         shadow.free[k] = both(before, free, dot(shadow.edges[k], edge));
         shadow.edges[k] = abs(free - 0.5) < abs(before - 0.5) ? edge : shadow.edges[k];
 #if EDGES

@@ -75,8 +75,8 @@ shared_struct! {
         radial: [f32; 4],
         /// Linear RGB radiance factor of the entity's light.
         emission: [f32; 3],
-        /// The largest channel of its albedo.
-        reflectance: f32,
+        /// Share of light that it keeps back where it blocks.
+        opacity: f32,
         /// Added to a stretched position, in r; w = the packed stretch factors of the axes
         /// ([`crate::field::Fit::packed`]).
         shift: [f32; 4],

@@ -36,6 +36,9 @@
 //! - Surfaces: a mesh is lit and drawn with more vertices where its own visibility varies ([`bake::surfaces`]).
 //! - Entities: everything receives, and everything but emitters occludes. Each can be set per entity. Scales are uniform
 //!   and positive.
+//! - Transparency: what lets light through blocks its opacity's share of a field or an outline. It stands before all
+//!   others, its own group too, as something that moves does; nothing counts what it passes on as coloured. What a
+//!   texture cuts out is a hole for rays and captures alike ([`asset::pierce`]).
 //! - Sheets: a flat mesh blocks light from both sides. What a rectangle blocks has a closed form, for SH and for sharp
 //!   lights, so nothing is baked of it; other flat meshes have fields as all others do. A point within 0.002 bounding radii of its receiver from the
 //!   sheet's plane counts as that far from it, on the side of its receiver's centre ([`field::sheet`]).

@@ -55,7 +55,7 @@ impl Crowded {
             centre: own.centre.as_vec3().extend(1.0 / own.radius_m as f32).to_array(),
             alpha_beta: [turns[0], turns[1], turns[2], turns[3]],
             gamma: [turns[4], turns[5]],
-            reflectance: 0.3 + 0.7 * rng.f32(),
+            albedo: [(0.3 + 0.7 * rng.f32()) / std::f32::consts::PI; 3],
             scale: 0.5 + rng.f32(),
             ..Default::default()
         };

@@ -99,7 +99,7 @@ fn drawing() -> Vec<ShaderPermutation> {
         .flat_map(|display| looks.iter().map(move |look| (display, *look)))
         .flat_map(|(display, look)| {
             let patches = sharp.iter().flat_map(move |sharp| DrawTriangles::patch_rows(display, look, sharp));
-            DrawTriangles::rows(display, look).into_iter().chain(patches)
+            [false, true].into_iter().flat_map(move |over| DrawTriangles::rows(display, look, over)).chain(patches)
         });
     let fragments = grids.chain(triangles);
     fragments

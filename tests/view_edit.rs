@@ -82,6 +82,7 @@ fn entity_with(motion: impl Strategy<Value = Motion>) -> impl Strategy<Value = E
             albedo: Vec3::splat(0.5).into(),
             gloss: None,
             maps: Default::default(),
+            opacity: 1.0,
             emission: Vec3::ZERO,
             spot: None,
             emits: None,

@@ -248,6 +248,14 @@ impl Mesh {
         }
     }
 
+    /// The mesh as one that has holes: neither closed nor a rectangle.
+    pub(super) fn opened(mut self) -> Self {
+        self.shape = topology::Topology { closed: false, solid: false, convex: false, ..self.shape };
+        self.rectangle = None;
+        self.panel = None;
+        self
+    }
+
     pub(crate) fn attributes(&self) -> Attributes {
         Attributes { colors: self.colors.clone(), uvs: self.uvs.clone(), tints: self.tints.clone() }
     }

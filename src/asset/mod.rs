@@ -29,6 +29,7 @@ mod outline;
 pub(crate) mod panel;
 mod peak;
 pub mod picture;
+pub mod pierce;
 mod radiance;
 pub mod sky;
 pub(crate) mod teapot;

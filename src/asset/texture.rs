@@ -116,6 +116,11 @@ impl Texels {
         Vec4::from_array(self.rgba[y * self.width + x].map(|byte| f32::from(byte) / 255.0))
     }
 
+    /// Whether any texel lets light through.
+    pub fn has_alpha(&self) -> bool {
+        self.rgba.iter().any(|texel| texel[3] < u8::MAX)
+    }
+
     /// The mean linear colour.
     pub fn mean(&self) -> Vec3 {
         let all = (0..self.rgba.len()).map(|i| self.linear(i % self.width, i / self.width).truncate().as_dvec3());
@@ -170,8 +175,10 @@ pub struct Texture {
     pub texels: Option<Arc<Texels>>,
     pub wrap: [Wrap; 2],
     pub factor: Vec3,
-    /// Places whose alpha is less are not drawn.
+    /// Places whose alpha is less are holes.
     pub alpha_cutoff: Option<f32>,
+    /// Whether its alpha is the opacity of a place, in place of a cutoff.
+    pub alpha_blend: bool,
 }
 
 impl Texture {
@@ -189,8 +196,35 @@ impl Texture {
         self.factor * color * tint
     }
 
+    /// The share of light that a place of a triangle of a mesh keeps back.
+    pub fn opacity_at(&self, mesh: &Mesh, corners: [u32; 3], weights: [f32; 3]) -> f32 {
+        let varies = self.alpha_blend || self.alpha_cutoff.is_some();
+        let Some((texels, uvs)) = self.texels.as_ref().zip(mesh.uvs.as_ref()).filter(|_| varies) else { return 1.0 };
+        let uv: Vec2 = corners.iter().zip(weights).map(|(&v, weight)| weight * uvs[v as usize]).sum();
+        let alpha = texels.at(uv, self.wrap).w;
+        self.alpha_cutoff.map_or(alpha, |cutoff| if alpha < cutoff { 0.0 } else { 1.0 })
+    }
+
+    /// The mean share of light that a mesh's surface keeps back beside its holes.
+    pub fn mean_opacity(&self, mesh: &Mesh) -> f32 {
+        if !self.alpha_blend {
+            return 1.0;
+        }
+        self.mean_of(mesh, |corners, weights| Vec3::splat(self.opacity_at(mesh, corners, weights))).x.min(1.0)
+    }
+
     /// The mean reflectance of a mesh's surface.
     pub fn mean(&self, mesh: &Mesh) -> Vec3 {
+        let blended = |corners, weights| if self.alpha_blend { self.opacity_at(mesh, corners, weights) } else { 1.0 };
+        let mean = self.mean_of(mesh, |corners, weights| blended(corners, weights) * self.at(mesh, corners, weights));
+        match &self.texels {
+            Some(texels) if mesh.uvs.is_none() => mean * texels.mean(),
+            _ => mean,
+        }
+    }
+
+    /// The mean over a mesh's surface of a value at places of its triangles.
+    fn mean_of(&self, mesh: &Mesh, at: impl Fn([u32; 3], [f32; 3]) -> Vec3) -> Vec3 {
         let coordinates = self.texels.as_ref().zip(mesh.uvs.as_ref());
         let mut sum = DVec3::ZERO;
         let mut whole = 0.0;
@@ -203,15 +237,11 @@ impl Texture {
                 let sides = [0, 1, 2].map(|k| ((corners[k] - corners[(k + 1) % 3]) * size).length());
                 (sides.into_iter().fold(0.0, f32::max) / 8.0).clamp(1.0, 8.0) as usize
             });
-            let color: Vec3 = middles(cuts).map(|weights| self.at(mesh, *triangle, weights)).sum();
+            let color: Vec3 = middles(cuts).map(|weights| at(*triangle, weights)).sum();
             sum += area * (color / (cuts * cuts) as f32).as_dvec3();
             whole += area;
         }
-        let mean = (sum / whole.max(f64::MIN_POSITIVE)).as_vec3();
-        match &self.texels {
-            Some(texels) if mesh.uvs.is_none() => mean * texels.mean(),
-            _ => mean,
-        }
+        (sum / whole.max(f64::MIN_POSITIVE)).as_vec3()
     }
 }
 
@@ -242,7 +272,14 @@ mod tests {
         let attributes = Attributes { uvs: Some(uvs), ..Attributes::default() };
         let mesh =
             Mesh::with_attributes("square", positions, Vec::new(), attributes, vec![[0, 1, 2], [0, 2, 3]]).unwrap();
-        Texture { texels: Some(Arc::new(texels)), wrap: [Wrap::Repeat; 2], factor, alpha_cutoff: None }.mean(&mesh)
+        Texture {
+            texels: Some(Arc::new(texels)),
+            wrap: [Wrap::Repeat; 2],
+            factor,
+            alpha_cutoff: None,
+            alpha_blend: false,
+        }
+        .mean(&mesh)
     }
 
     #[test]

@@ -72,11 +72,12 @@ impl SceneNeeds {
     /// needed.
     pub fn of(scene: &Scene, options: &Options, lights: Lights) -> Self {
         let (groups, surfaces) = surfaces(scene, options, lights);
-        let of_mesh = |(index, mesh): (usize, &Arc<Mesh>)| {
+        let of_mesh = |index: usize| {
+            let mesh = scene.caster(index);
             let needed = needs(scene, index, lights, &groups);
             (needed, needed.fields.map(|kind| kind.map(|kind| header(mesh, kind, options))))
         };
-        let meshes = scene.meshes.iter().enumerate().map(of_mesh).collect();
+        let meshes = (0..scene.meshes.len()).map(of_mesh).collect();
         SceneNeeds { meshes, surfaces, groups, options: *options }
     }
 
@@ -90,7 +91,8 @@ impl SceneNeeds {
 
     /// Whether everything is in the cache, so that [`ensure()`] bakes nothing.
     pub fn are_cached(&self, scene: &Scene, cache: &Cache) -> bool {
-        scene.meshes.iter().zip(&self.meshes).all(|(mesh, (needed, headers))| {
+        let mut meshes = self.meshes.iter().enumerate().map(|(index, needs)| (scene.caster(index), needs));
+        meshes.all(|(mesh, (needed, headers))| {
             headers.iter().flatten().all(|header| cache.has_field(header))
                 && (!needed.silhouette || cache.has_silhouette(mesh, &self.options))
         }) && self.surfaces.groups.iter().all(|group| cache.has_surfaces(group))
@@ -102,7 +104,8 @@ impl SceneNeeds {
     /// number of captures.
     pub fn missing(&self, scene: &Scene, cache: &Cache) -> Vec<(String, u32)> {
         let mut missing: Vec<(String, u32)> = Vec::new();
-        for (mesh, (needed, headers)) in scene.meshes.iter().zip(&self.meshes) {
+        for (index, (needed, headers)) in self.meshes.iter().enumerate() {
+            let mesh = scene.caster(index);
             for header in headers.iter().flatten().filter(|header| !cache.has_field(header)) {
                 missing.push((field_title(mesh, header), header.lattice.sample_count()));
             }
@@ -148,7 +151,7 @@ pub fn needs(scene: &Scene, mesh: usize, lights: Lights, groups: &Groups) -> Nee
     let harmonics = light::has_harmonics(scene, lights);
     let sharp = light::has_sharp(scene, lights);
     let shines = |wanted: LightMethod| seen().any(|e| scene.entities[e].emits && method(e) == wanted);
-    let casts = scene.meshes[mesh].rectangle().is_none();
+    let casts = scene.caster(mesh).rectangle().is_none();
     let blocked = (casts && harmonics && seen_by_others().any(|e| scene.entities[e].occludes))
         || (shines(LightMethod::Harmonics) && !coloured);
     let radiance = coloured && shines(LightMethod::Harmonics);
@@ -202,7 +205,8 @@ pub fn ensure(
     let mut making = Making { progress, baked: Vec::new(), fields: HashMap::new(), silhouettes: HashMap::new() };
     let options = &needs.options;
     let mut meshes = Vec::with_capacity(scene.meshes.len());
-    for (mesh, (needed, headers)) in scene.meshes.iter().zip(&needs.meshes) {
+    for (index, (needed, headers)) in needs.meshes.iter().enumerate() {
+        let mesh = scene.caster(index);
         let mut to = BakedMesh::default();
         for (header, to) in headers.iter().zip([&mut to.blocked, &mut to.radiance]) {
             let Some(header) = header else { continue };

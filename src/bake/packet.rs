@@ -2,15 +2,20 @@
 //! all, and vector instructions take eight of them where the processor has AVX2.
 
 use super::triangles::weights;
+use crate::asset::Mesh;
+use crate::asset::texture::Texture;
 use glam::{Mat3A, Vec3, Vec3A};
 use obvhs::BvhBuildParams;
 use obvhs::bvh2::{Bvh2, builder::build_bvh2_from_tris};
 use obvhs::triangle::Triangle;
 use pulp::{Arch, Simd, WithSimd};
+use std::sync::Arc;
 use std::time::Duration;
 
 /// Rays of a packet.
 const LANES: usize = 16;
+/// Holes that a ray passes at most.
+const MOST_HOLES: usize = 32;
 /// How far beyond its sides a triangle reaches, as a share of them: no ray slips between two neighbours.
 const SLACK: f32 = 1e-5;
 
@@ -22,6 +27,23 @@ pub struct Blockers {
     members: Vec<u32>,
     /// Which triangle of the member's mesh each is.
     numbers: Vec<u32>,
+    /// Holes of each member's surface; empty where none has any.
+    masks: Vec<Option<Mask>>,
+}
+
+/// A surface that has holes.
+#[derive(Clone)]
+pub struct Mask {
+    pub mesh: Arc<Mesh>,
+    pub texture: Arc<Texture>,
+}
+
+impl Mask {
+    /// Whether a place of a triangle, given by the weights of its second and third corner, is a hole.
+    fn is_hole(&self, triangle: u32, [v, w]: [f32; 2]) -> bool {
+        let corners = self.mesh.triangles[triangle as usize];
+        self.texture.opacity_at(&self.mesh, corners, [1.0 - v - w, v, w]) < 0.5
+    }
 }
 
 /// A triangle that blocks.
@@ -55,6 +77,8 @@ pub struct BlockerHit {
 struct Packet {
     direction: [[f32; LANES]; 3],
     inverse: [[f32; LANES]; 3],
+    /// Nothing up to this distance counts.
+    from: [f32; LANES],
     distance: [f32; LANES],
     triangle: [u32; LANES],
     middle: Vec3A,
@@ -67,6 +91,7 @@ impl Packet {
         let mut packet = Packet {
             direction: [[0.0; LANES]; 3],
             inverse: [[0.0; LANES]; 3],
+            from: [0.0; LANES],
             distance: [f32::INFINITY; LANES],
             triangle: [u32::MAX; LANES],
             middle: Vec3A::ZERO,
@@ -86,6 +111,10 @@ impl Packet {
             }
         }
         packet
+    }
+
+    fn toward(&self, lane: usize) -> Vec3A {
+        Vec3A::new(self.direction[0][lane], self.direction[1][lane], self.direction[2][lane])
     }
 
     /// Whether any ray enters a box, given from the rays' origin, nearer than what it has met.
@@ -121,6 +150,7 @@ impl Packet {
         let most = simd.splat_f32s(1.0 + SLACK);
         let along_rays =
             [vectors::<S>(&self.direction[0]), vectors::<S>(&self.direction[1]), vectors::<S>(&self.direction[2])];
+        let from = vectors::<S>(&self.from);
         let (distances, _) = S::as_mut_simd_f32s(&mut self.distance);
         let (triangles, _) = S::as_mut_simd_u32s(&mut self.triangle);
         for i in 0..distances.len() {
@@ -133,10 +163,8 @@ impl Packet {
                 simd.and_m32s(simd.greater_than_or_equal_f32s(u, least), simd.greater_than_or_equal_f32s(v, least)),
                 simd.less_than_or_equal_f32s(simd.add_f32s(u, v), most),
             );
-            let nearer = simd.and_m32s(
-                simd.greater_than_f32s(distance, simd.splat_f32s(0.0)),
-                simd.less_than_f32s(distance, distances[i]),
-            );
+            let nearer =
+                simd.and_m32s(simd.greater_than_f32s(distance, from[i]), simd.less_than_f32s(distance, distances[i]));
             let meets = simd.and_m32s(within, nearer);
             distances[i] = simd.select_f32s(meets, distance, distances[i]);
             triangles[i] = simd.select_u32s(meets, simd.splat_u32s(index), triangles[i]);
@@ -178,6 +206,12 @@ impl WithSimd for Cast<'_> {
         for rays in directions.chunks(LANES) {
             let mut packet = Packet::new(turn, rays);
             blockers.traverse(simd, origin, &mut packet, counts, &mut open);
+            for _ in 0..MOST_HOLES {
+                if !blockers.passes_holes(origin, &mut packet, rays.len()) {
+                    break;
+                }
+                blockers.traverse(simd, origin, &mut packet, counts, &mut open);
+            }
             for lane in 0..rays.len() {
                 hits.push(blockers.hit(&packet, lane));
             }
@@ -186,8 +220,8 @@ impl WithSimd for Cast<'_> {
 }
 
 impl Blockers {
-    /// Builds the hierarchy; one of no triangles blocks nothing.
-    pub fn new(triangles: impl IntoIterator<Item = BlockerTriangle>) -> Self {
+    /// Builds the hierarchy; one of no triangles blocks nothing. `masks` are of each member, or empty.
+    pub fn new(triangles: impl IntoIterator<Item = BlockerTriangle>, masks: Vec<Option<Mask>>) -> Self {
         let of: Vec<BlockerTriangle> = triangles.into_iter().collect();
         let triangle = |BlockerTriangle { corners: [a, b, c], .. }: &BlockerTriangle| Triangle {
             v0: (*a).into(),
@@ -205,8 +239,29 @@ impl Blockers {
             triangles: hierarchy.primitive_indices.iter().map(corners).collect(),
             members: hierarchy.primitive_indices.iter().map(|&i| of[i as usize].member).collect(),
             numbers: hierarchy.primitive_indices.iter().map(|&i| of[i as usize].number).collect(),
+            masks: if masks.iter().any(Option::is_some) { masks } else { Vec::new() },
             hierarchy,
         }
+    }
+
+    /// Lets the rays that met a hole go on behind it. Returns whether there are any.
+    fn passes_holes(&self, origin: Vec3A, packet: &mut Packet, count: usize) -> bool {
+        if self.masks.is_empty() {
+            return false;
+        }
+        let mut passes = false;
+        for lane in 0..count {
+            let Some(hit) = self.hit(packet, lane) else { continue };
+            let Some(mask) = &self.masks[hit.member as usize] else { continue };
+            let (triangle, weights) = self.place(origin, packet.toward(lane), &hit);
+            if mask.is_hole(triangle, weights) {
+                packet.from[lane] = hit.distance * (1.0 + 1e-5);
+                packet.distance[lane] = f32::INFINITY;
+                packet.triangle[lane] = u32::MAX;
+                passes = true;
+            }
+        }
+        passes
     }
 
     /// The first triangle on each ray of those whose members count. `turn` brings the directions into the triangles' frame.
@@ -259,12 +314,11 @@ impl Blockers {
         if triangle == u32::MAX {
             return None;
         }
-        let direction = Vec3A::new(packet.direction[0][lane], packet.direction[1][lane], packet.direction[2][lane]);
         Some(BlockerHit {
             distance: packet.distance[lane],
             member: self.members[triangle as usize],
             index: triangle,
-            from_behind: self.triangles[triangle as usize].normal.dot(direction) > 0.0,
+            from_behind: self.triangles[triangle as usize].normal.dot(packet.toward(lane)) > 0.0,
         })
     }
 
@@ -279,7 +333,10 @@ impl Blockers {
 mod tests {
     use super::*;
     use crate::asset::generate;
+    use crate::asset::mesh::Attributes;
+    use crate::asset::texture::{Texels, Wrap};
     use crate::sh::quadrature::random_direction;
+    use glam::Vec2;
 
     /// Against every triangle by itself.
     #[test]
@@ -288,7 +345,7 @@ mod tests {
         let corners: Vec<[Vec3; 3]> = mesh.triangles.iter().map(|t| t.map(|i| mesh.positions[i as usize])).collect();
         let triangle =
             |(number, corners): (u32, &[Vec3; 3])| BlockerTriangle { member: number % 2, number, corners: *corners };
-        let blockers = Blockers::new((0..).zip(&corners).map(triangle));
+        let blockers = Blockers::new((0..).zip(&corners).map(triangle), Vec::new());
         let mut rng = fastrand::Rng::with_seed(3);
         let mut hits = Vec::new();
         let mut met = 0;
@@ -318,7 +375,42 @@ mod tests {
             }
         }
         assert!((300..3300).contains(&met), "{met}");
-        Blockers::new([]).first(Vec3A::ZERO, &Mat3A::IDENTITY, &[Vec3A::X], &[], &mut hits);
+        Blockers::new([], Vec::new()).first(Vec3A::ZERO, &Mat3A::IDENTITY, &[Vec3A::X], &[], &mut hits);
         assert_eq!(hits, [None]);
+    }
+
+    /// A ray passes the holes of squares that stand one behind the other, up to the first place that is none.
+    #[test]
+    fn rays_pass_holes() {
+        let corners = [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]];
+        let positions = corners.map(|[x, y]| Vec3::new(x, y, 0.0)).to_vec();
+        let attributes = Attributes { uvs: Some(corners.map(Vec2::from).to_vec()), ..Attributes::default() };
+        let triangles = vec![[0, 1, 2], [0, 2, 3]];
+        let mesh = Arc::new(Mesh::with_attributes("square", positions, Vec::new(), attributes, triangles).unwrap());
+        // The left half has no holes.
+        let rgba = (0..16).map(|i| [255, 255, 255, if i % 4 < 2 { 255 } else { 0 }]).collect();
+        let texels = Some(Arc::new(Texels { width: 4, height: 4, rgba }));
+        let texture = Arc::new(Texture {
+            texels,
+            wrap: [Wrap::Repeat; 2],
+            factor: Vec3::ONE,
+            alpha_cutoff: Some(0.5),
+            alpha_blend: false,
+        });
+        let square = |member: u32, z: f32| {
+            let mesh = &mesh;
+            (0..2).map(move |number: u32| {
+                let corners = mesh.triangles[number as usize].map(|v| mesh.positions[v as usize] + z * Vec3::Z);
+                BlockerTriangle { member, number, corners }
+            })
+        };
+        let mask = Some(Mask { mesh: mesh.clone(), texture });
+        let blockers =
+            Blockers::new(square(0, 1.0).chain(square(1, 2.0)).chain(square(2, 3.0)), vec![mask.clone(), mask, None]);
+        let mut hits = Vec::new();
+        for (x, distance) in [(0.3, 1.0), (0.7, 3.0)] {
+            blockers.first(Vec3A::new(x, 0.5, 0.0), &Mat3A::IDENTITY, &[Vec3A::Z], &[true; 3], &mut hits);
+            assert!((hits[0].unwrap().distance - distance).abs() < 1e-5, "{x}: {hits:?}");
+        }
     }
 }

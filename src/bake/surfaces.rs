@@ -4,7 +4,7 @@
 use super::cluster_order::cluster_order;
 use super::links::{Met, Runs, links};
 use super::own_visibility::{Counts, Eye, Front, PATTERN, Rays, Seen, Standing, see};
-use super::packet::{BlockerTriangle, Blockers};
+use super::packet::{BlockerTriangle, Blockers, Mask};
 use super::refine::{Limits, Refined, refine};
 use super::triangles::{distinct, weights};
 use super::{BakeReport, Options, Progress, TRANSFER_OFFSET, Wanted, bakes_transfer};
@@ -12,6 +12,7 @@ use crate::asset::Mesh;
 use crate::asset::enclose::around_spheres;
 use crate::asset::grid::Grid;
 use crate::asset::mesh::Attributes;
+use crate::asset::texture::Texture;
 use crate::field::quantity::channel_stride;
 use crate::field::self_visibility::{self, BYTES};
 use crate::layout::CLUSTER_VERTICES;
@@ -47,7 +48,12 @@ const WAYS_OUT: [f32; 5] = [0.06, 0.15, 0.3, 0.5, 0.8];
 pub struct Member {
     pub mesh: Arc<Mesh>,
     pub placement: Placement,
+    /// Whether it keeps light back, all of it, but for its holes. One that lets light through stands on lists.
     pub occludes: bool,
+    /// Whether it lets light through, of its own too.
+    pub transparent: bool,
+    /// The texture that makes holes in it.
+    pub mask: Option<Arc<Texture>>,
     /// Members that shine block the view of the sky alone: before sharp lights they stand on lists.
     pub emits: bool,
     pub receives: bool,
@@ -116,16 +122,21 @@ impl SurfacePlan {
             let mesh = scene.meshes[of.mesh].clone();
             let generated = scene.data.meshes.get(of.mesh).is_some_and(|data| data.generator.is_some());
             let refines = refinement.is_some() && of.receives && scene.is_at_rest(entity) && !generated;
-            Member { mesh, placement, occludes: of.occludes, emits: of.emits, receives: of.receives, refines }
+            let transparent = of.transparent;
+            let occludes = of.occludes && !transparent;
+            let mask = scene.mask(entity).cloned();
+            Member { mesh, placement, occludes, transparent, mask, emits: of.emits, receives: of.receives, refines }
         };
         let mut plans: Vec<GroupPlan> = Vec::new();
         // The plans of entities alone: those with equal meshes share what is baked.
-        let mut alone: HashMap<([u8; 32], bool, bool), usize> = HashMap::new();
+        let mut alone: HashMap<([u8; 32], [bool; 3], Option<*const Texture>), usize> = HashMap::new();
         for entities in groups.members() {
             let members: Vec<Member> = if let [only] = entities[..] {
                 // What an entity blocks of its own view does not depend on its place.
-                let member = Member { occludes: true, emits: false, ..member(only, AT_ORIGIN) };
-                let plan = alone.entry((member.mesh.content_hash(), member.receives, member.refines));
+                let member = Member { emits: false, ..member(only, AT_ORIGIN) };
+                let member = Member { occludes: !member.transparent, ..member };
+                let kind = [member.receives, member.refines, member.transparent];
+                let plan = alone.entry((member.mesh.content_hash(), kind, member.mask.as_ref().map(Arc::as_ptr)));
                 if let Entry::Occupied(known) = &plan {
                     plans[*known.get()].entities.push(only);
                     continue;
@@ -155,6 +166,8 @@ impl GroupPlan {
             mesh: mesh.clone(),
             placement: AT_ORIGIN,
             occludes: true,
+            transparent: false,
+            mask: None,
             emits: false,
             receives: true,
             refines: false,
@@ -194,6 +207,11 @@ impl GroupPlan {
                 format!("{:?}", (member.placement, member.occludes, member.emits, member.receives, member.refines))
                     .as_bytes(),
             );
+            hasher.update(&[u8::from(member.transparent)]);
+            if let Some((mask, texels)) = member.mask.as_ref().and_then(|mask| Some((mask, mask.texels.as_ref()?))) {
+                hasher.update(format!("{:?}", (mask.wrap, mask.alpha_cutoff, texels.width)).as_bytes());
+                hasher.update(texels.rgba.as_flattened());
+            }
         }
         hasher.finalize().to_hex()[..32].to_owned()
     }
@@ -320,11 +338,14 @@ impl<'p> Group<'p> {
             };
             distinct(mesh).iter().map(triangle).collect::<Vec<_>>()
         });
-        Group { plan, blockers: Blockers::new(triangles), centre, radius_m, standings, spheres }
+        let mask = |member: &Member| Some(Mask { mesh: member.mesh.clone(), texture: member.mask.clone()? });
+        let blockers = Blockers::new(triangles, plan.members.iter().map(mask).collect());
+        Group { plan, blockers, centre, radius_m, standings, spheres }
     }
 
     fn space(&self, member: usize) -> GroupSpace<'_> {
-        let blocks: Vec<bool> = (0..).zip(&self.plan.members).map(|(i, of)| i == member || of.occludes).collect();
+        let blocks: Vec<bool> =
+            (0..).zip(&self.plan.members).map(|(i, of)| (i == member && !of.transparent) || of.occludes).collect();
         let others = (0..).zip(&blocks).map(|(i, blocks)| i != member && *blocks).collect();
         GroupSpace { group: self, member, blocks, others }
     }
@@ -428,7 +449,8 @@ impl GroupSpace<'_> {
             let (middle, reach) = group.spheres[*member];
             let of = &group.plan.members[*member];
             // Outlines of these hold at every distance.
-            let keeps_outline = of.emits || of.mesh.rectangle().is_some() || of.mesh.is_convex();
+            let keeps_outline =
+                of.emits || (of.mask.is_none() && (of.mesh.rectangle().is_some() || of.mesh.is_convex()));
             *member == self.member || (of.occludes && !keeps_outline && middle.distance(centre) - radius < FAR * reach)
         };
         (0..group.spheres.len()).filter(is_near).map(|member| member as u32).collect()

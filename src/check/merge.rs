@@ -43,6 +43,7 @@ mesh = "floor"
 [[entity]]
 mesh = "ball"
 position = [-0.713, 0.667, 0.119]
+opacity = 0.6
 [[entity]]
 mesh = "ring"
 position = [0.613, 0.871, -0.379]

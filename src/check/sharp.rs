@@ -43,6 +43,7 @@ name = "board"
 cuboid = { size_m = [1.7, 0.03, 1.3], cells = 2 }
 [[entity]]
 mesh = "board"
+opacity = 0.7
 position = [0.213, 0.917, 0.191]
 rotation = { axis = [0.7, 0.1, 0.3], angle_deg = 13 }
 [[mesh]]

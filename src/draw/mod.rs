@@ -49,14 +49,14 @@ pub enum DrawnMesh {
 
 impl DrawnMesh {
     /// Uploads a mesh with its vertices in `order`. The emission pattern of a mesh without colours is white. `vertices`
-    /// counts the vertices of everything that is drawn together. One that is glossy is drawn by its triangles.
-    pub fn new(device: &Arc<Device>, mesh: &Mesh, order: &[u32], vertices: usize, glossy: bool) -> Result<Self> {
+    /// counts the vertices of everything that is drawn together. With `by_triangles` no grid is drawn as one.
+    pub fn new(device: &Arc<Device>, mesh: &Mesh, order: &[u32], vertices: usize, by_triangles: bool) -> Result<Self> {
         let (centre, _) = mesh.bounding_sphere();
         let mut place = vec![0; order.len()];
         for (at, &v) in order.iter().enumerate() {
             place[v as usize] = at as u32;
         }
-        let is_plain = mesh.uvs.is_none() && mesh.tints.is_none() && !glossy;
+        let is_plain = mesh.uvs.is_none() && mesh.tints.is_none() && !by_triangles;
         if let Some(grid) =
             Grid::find(mesh).filter(|_| is_plain).filter(|grid| DrawnGrid::fits(device, grid.vertices.len(), vertices))
         {
@@ -114,8 +114,10 @@ pub struct DrawnEntity<'d> {
     pub emission: Vec3,
     /// Byte offset of its vertices in the radiosity buffer.
     pub radiosity_offset: u64,
-    /// Alpha of the picture where the entity is seen.
+    /// Alpha of the picture where the entity is seen; of a transparent one its opacity, less what textures take.
     pub tag: f32,
+    /// Whether it is drawn over what lies behind it.
+    pub transparent: bool,
     pub index: u32,
     /// What varies its reflectance, if anything does.
     pub paint: Option<DrawnPaint<'d>>,
@@ -166,7 +168,7 @@ impl EntityPush {
 pub struct DrawnViewport<'d> {
     /// Left, top, width and height in pixels.
     pub area: [u32; 4],
-    /// The entities that are drawn, in this order.
+    /// The entities that are drawn, in this order: transparent ones last, from far to near.
     pub entities: Vec<DrawnEntity<'d>>,
     pub radiosity: &'d Buffer,
     /// What glossy entities reflect; `None` where they are shown as diffuse.
@@ -184,6 +186,8 @@ pub struct Surfaces<'p> {
     pub sharp: Option<&'p SharpPermutation>,
     /// Whether textures vary reflectances.
     pub painted: bool,
+    /// Whether any is transparent.
+    pub transparent: bool,
     /// Whether any is glossy, and how the sharp lights are evaluated of which it has highlights.
     pub gloss: Option<Option<&'p SharpPermutation>>,
 }
@@ -300,8 +304,10 @@ impl Draw {
         if viewports.iter().any(|viewport| viewport.pixel.is_some()) {
             commands.count_samples()?;
         }
-        let every =
-            viewports.iter().flat_map(|viewport| viewport.entities.iter().map(move |entity| (viewport, entity)));
+        let every = viewports.iter().flat_map(|viewport| {
+            let opaque = viewport.entities.iter().filter(|entity| !entity.transparent);
+            opaque.map(move |entity| (viewport, entity))
+        });
         let batches = batches(every, 3 * self.batch_triangles);
         let count = batches.len();
         for (number, batch) in batches.into_iter().enumerate() {
@@ -328,7 +334,11 @@ impl Draw {
                         }
                     }
                 }
-                if number + 1 == count { self.record_patches(drawing, viewports, white) } else { Ok(()) }
+                if number + 1 < count {
+                    return Ok(());
+                }
+                self.record_patches(drawing, viewports, white)?;
+                self.record_transparent(drawing, viewports, white)
             })?;
         }
         Ok(())
@@ -336,6 +346,25 @@ impl Draw {
 }
 
 impl Draw {
+    /// Draws transparent entities, whose depth nothing keeps, over everything else.
+    fn record_transparent<'r>(
+        &'r self,
+        drawing: &mut Drawing<'_, 'r>,
+        viewports: &[DrawnViewport<'r>],
+        white: f32,
+    ) -> Result<()> {
+        for viewport in viewports {
+            let [left, top, width, height] = viewport.area;
+            for entity in viewport.entities.iter().filter(|entity| entity.transparent && !entity.indices.is_empty()) {
+                let DrawnMesh::Triangles(mesh) = entity.mesh else { continue };
+                drawing.area(left, top, width, height);
+                self.triangles.bind(drawing, mesh, entity, viewport, white)?;
+                entity.indices.iter().for_each(|range| drawing.indexed(range.clone()));
+            }
+        }
+        Ok(())
+    }
+
     /// Draws the patches of all grids and triangles, after everything that may hide them: a pixel of a patch costs
     /// most.
     fn record_patches<'r>(

@@ -8,7 +8,7 @@ use crate::draw::pixel_light::{PixelLight, texels};
 use crate::draw::{DrawnEntity, DrawnPaint, DrawnViewport, EntityPush, Surfaces};
 use crate::error::Result;
 use crate::gloss::{self, DrawnReflections};
-use crate::gpu::{Bind, Buffer, Device, Drawing, GraphicsPipeline, GraphicsState, TexelView};
+use crate::gpu::{Bind, Buffer, Device, Drawing, GraphicsPipeline, GraphicsState, Keeps, TexelView};
 use crate::lists::sight::TriangleRun;
 use crate::shaders::{Library, ShaderPermutation};
 use crate::sharp::SharpPermutation;
@@ -173,6 +173,8 @@ struct Pipelines {
     solid: GraphicsPipeline,
     /// The one whose pixels evaluate sharp lights, where the scene has any.
     pixel: Option<GraphicsPipeline>,
+    /// As the first two, over what lies behind, where the scene has transparent surfaces.
+    over: Option<[GraphicsPipeline; 2]>,
 }
 
 pub struct DrawTriangles {
@@ -195,10 +197,19 @@ impl DrawTriangles {
         surfaces: &Surfaces<'_>,
     ) -> Result<Self> {
         let pipelines = |look: Look<'_>| -> Result<Pipelines> {
-            let [vertex, fragment] = Self::rows(display, look);
+            let [vertex, fragment] = Self::rows(display, look, false);
             let vertex = library.shader(&vertex)?;
             let fragment = library.shader(&fragment)?;
             let solid = GraphicsState { cull: vk::CullModeFlags::BACK, ..state };
+            let over = || -> Result<[GraphicsPipeline; 2]> {
+                let [_, fragment] = Self::rows(display, look, true);
+                let fragment = library.shader(&fragment)?;
+                let of = |name, state| {
+                    let over = GraphicsState { keeps: Keeps::ColorOver, ..state };
+                    GraphicsPipeline::new(device, name, &vertex, &fragment, over)
+                };
+                Ok([of("draw over", state)?, of("draw solid over", solid)?])
+            };
             let pixel = |sharp: &SharpPermutation| -> Result<GraphicsPipeline> {
                 let [vertex, fragment] = Self::patch_rows(display, look, sharp);
                 let nearer = GraphicsState { nearer_steps: NEARER_STEPS, ..state };
@@ -210,6 +221,7 @@ impl DrawTriangles {
                 open: GraphicsPipeline::new(device, "draw", &vertex, &fragment, state)?,
                 solid: GraphicsPipeline::new(device, "draw solid", &vertex, &fragment, solid)?,
                 pixel: surfaces.sharp.map(pixel).transpose()?,
+                over: surfaces.transparent.then(over).transpose()?,
             })
         };
         let glossy = |highlights| -> Result<[Pipelines; 3]> {
@@ -248,10 +260,11 @@ impl DrawTriangles {
         std::array::from_fn(|k| Bind::Texture(maps[k].unwrap_or(neutral[k])))
     }
 
-    /// The rows of the shaders that show the light of vertices: vertex and fragment.
-    pub fn rows(display: bool, look: Look<'_>) -> [ShaderPermutation; 2] {
+    /// The rows of the shaders that show the light of vertices: vertex and fragment. With `over` what they draw lies over
+    /// what is behind it.
+    pub fn rows(display: bool, look: Look<'_>, over: bool) -> [ShaderPermutation; 2] {
         let row = |file| look.macros(ShaderPermutation::new(file, 4), GLOSS_BINDINGS[0]);
-        let fragment = row("draw.frag").define("DISPLAY", display);
+        let fragment = row("draw.frag").define("DISPLAY", display).define("OVER", over);
         let fragment = match look {
             Look::Glossy { highlights: Some(sharp), .. } => sharp.pixel_row(fragment, false),
             _ => fragment,
@@ -281,7 +294,12 @@ impl DrawTriangles {
             vec![(&mesh.positions, 0), (&mesh.emission, 0), (viewport.radiosity, entity.radiosity_offset)];
         let (pipelines, paint, gloss) = self.pipelines(entity, viewport);
         vertices.extend(mesh.paint.iter().filter(|_| paint.is_some()).map(|paint| (paint, 0)));
-        drawing.bind(if entity.culls { &pipelines.solid } else { &pipelines.open }, &vertices, &mesh.indices);
+        let pipeline = match &pipelines.over {
+            Some(over) if entity.transparent => &over[usize::from(entity.culls)],
+            _ if entity.culls => &pipelines.solid,
+            _ => &pipelines.open,
+        };
+        drawing.bind(pipeline, &vertices, &mesh.indices);
         let push = EntityPush::new(entity, white);
         match paint {
             None => drawing.push(&push),

@@ -179,6 +179,7 @@ impl Frame {
         let surfaces = Surfaces {
             sharp: pixels.pixels(),
             painted: !buffers.textures.is_empty(),
+            transparent: scene.entities.iter().any(|entity| entity.transparent),
             gloss: reflections.is_some().then_some(highlights.as_ref()),
         };
         let entity_room = entity_count.max(merge.permutation.entity_limit as usize);

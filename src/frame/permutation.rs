@@ -142,7 +142,7 @@ pub(super) fn permutation(
         lattice: options.bake.lattice,
         skip: options.skip,
         lights: harmonic_lights(scene, methods),
-        sheets: scene.meshes.iter().any(|mesh| mesh.rectangle().is_some()),
+        sheets: (0..scene.meshes.len()).any(|mesh| scene.caster(mesh).rectangle().is_some()),
         gloss: scene.entities.iter().any(|entity| entity.reflection().is_some()),
         entity_limit,
     }

@@ -114,6 +114,7 @@ impl Frame {
         let surfaces = Surfaces {
             sharp: pixels.pixels(),
             painted: !self.buffers.textures.is_empty(),
+            transparent: self.scene.entities.iter().any(|entity| entity.transparent),
             gloss: self.reflections.is_some().then_some(sharp.as_ref()),
         };
         let draw = draw(&self.device, &self.library, &options, finish, &surfaces)?;

@@ -42,7 +42,7 @@ impl PixelChains {
                 vertex_first: surface.vertices.start,
                 self_first: surface.self_first,
             };
-            let lit = entity.receives && fits;
+            let lit = entity.receives && fits && !entity.transparent;
             receivers.push(lit.then_some((by_pixel, surface.reach_m)));
             clusters += if lit { (surface.vertices.len() as u32).div_ceil(CLUSTER_VERTICES) } else { 0 };
         }

@@ -42,7 +42,11 @@ impl Frame {
     fn outlines_at(&self, placements: &[Placement]) -> Vec<Option<OutlineView>> {
         let outline = |(entity, placement): (&Entity, &Placement)| {
             let slot = self.buffers.meshes[entity.mesh].silhouette.as_ref().filter(|_| entity.occludes)?;
-            Some(OutlineView { field: slot.field.clone(), to_object: placement.turn().inverse() })
+            Some(OutlineView {
+                field: slot.field.clone(),
+                to_object: placement.turn().inverse(),
+                opaque: entity.opacity >= 1.0,
+            })
         };
         let all = || self.scene.entities.iter().zip(placements).map(outline).collect();
         self.sharp.as_ref().map_or(Vec::new(), |_| all())
@@ -116,7 +120,7 @@ impl Frame {
             alpha_beta: [cos_a, sin_a, cos_b, sin_b],
             gamma: [cos_c, sin_c],
             emission: emission.to_array(),
-            reflectance: entity.albedo.max_element(),
+            opacity: entity.opacity,
             shift,
             albedo: (entity.albedo.as_dvec3() / PI).as_vec3().to_array(),
             scale: placement.scale,

@@ -134,6 +134,7 @@ impl FrameTwin<'_> {
                 area: buffers.meshes[entity.mesh].blocked.as_ref().map_or(Area::default(), |slot| slot.area),
                 radiance: radiance.as_ref().filter(|_| entity.emits),
                 sheet: self.frame.sheet(index, placement),
+                opacity: entity.opacity.into(),
             }
         };
         let objects: Vec<MergeObject<'_>> = self.placements.iter().enumerate().map(object).collect();
@@ -141,7 +142,7 @@ impl FrameTwin<'_> {
         let lit = |receiver: &Receiver| {
             let leaves = |v: usize, j: usize, light: Option<usize>| {
                 let (cluster_of, listed) = &receiver.clusters;
-                let is_own = self.frame.groups.share(j, receiver.index)
+                let is_own = self.frame.groups.is_own(receiver.index, j)
                     && light.is_none_or(|l| {
                         let is_sharp = self.frame.light_method(l).is_sharp() && l != j;
                         is_sharp && receiver.near[cluster_of[v]].binary_search(&(j as u32)).is_ok()
@@ -185,6 +186,7 @@ impl FrameTwin<'_> {
             radius_m: object.radius_m,
             silhouette: device_mesh.silhouette.as_ref().map(|slot| &*slot.field),
             sheet: object.sheet,
+            opacity: object.opacity,
         }
     }
 

@@ -100,7 +100,8 @@ impl Frame {
                 culls: sight.culls(),
                 emission: entity.emission,
                 radiosity_offset: self.radiosity.offsets[index],
-                tag: smooth::tag(index),
+                tag: if entity.transparent { self.scene.opacity(index) } else { smooth::tag(index) },
+                transparent: entity.transparent,
                 index: index as u32,
                 paint: self.paint(index),
                 gloss: self.drawn_gloss(entity),
@@ -108,11 +109,15 @@ impl Frame {
             };
             let radius_m = device_mesh.radius_m * f64::from(placement.scale);
             let distance_m = self.centre(index, placement).distance(camera.eye) - radius_m;
-            (drawn.mesh.grid().is_some(), distance_m, drawn)
+            let place = match entity.transparent {
+                true => (2, -distance_m),
+                false => (u8::from(drawn.mesh.grid().is_some()), distance_m),
+            };
+            (place.0, place.1, drawn)
         });
-        // From near to far, so that few fragments are shaded that something nearer hides later. Grids come last: a
-        // fragment of a grid costs most.
-        let mut drawn: Vec<(bool, f64, DrawnEntity<'_>)> = drawn.collect();
+        // From near to far, so that few fragments are shaded that something nearer hides later. Grids come later: a
+        // fragment of a grid costs most. What is transparent comes last, from far to near.
+        let mut drawn: Vec<(u8, f64, DrawnEntity<'_>)> = drawn.collect();
         drawn.sort_by(|a, b| a.0.cmp(&b.0).then(a.1.total_cmp(&b.1)));
         drawn.into_iter().map(|(_, _, entity)| entity).collect()
     }
@@ -147,11 +152,15 @@ impl Frame {
         let camera = &self.scene.data.camera;
         let clip_from_world = camera::clip_from_world(camera, aspect);
         let lines = placements.par_iter().enumerate().flat_map_iter(|(index, placement)| {
+            // Alpha has the tag of what is seen through a transparent one.
+            if self.scene.entities[index].transparent {
+                return Vec::new();
+            }
             let mesh = self.scene.entities[index].mesh;
             let world = camera::world_from_centred(placement, self.buffers.meshes[mesh].centre_m);
             let eye = world.inverse().transform_point3(camera.eye.as_dvec3());
             let lines = self.picture.edges[mesh].lines(clip_from_world * world, eye, true);
-            lines.into_iter().map(move |line| (line, smooth::tag(index)))
+            lines.into_iter().map(move |line| (line, smooth::tag(index))).collect()
         });
         lines.collect()
     }

@@ -187,6 +187,8 @@ pub enum Keeps {
     Largest,
     /// The last over what was there before, by its alpha, with which its colour is premultiplied.
     Over,
+    /// As [`Keeps::Over`], but alpha and depth stay what they were.
+    ColorOver,
 }
 
 /// Fixed-function state that differs between graphics pipelines. All have filled triangles, counter-clockwise
@@ -253,7 +255,7 @@ impl GraphicsPipeline {
             .rasterization_samples(vk::SampleCountFlags::from_raw(state.samples));
         let depth = vk::PipelineDepthStencilStateCreateInfo::default()
             .depth_test_enable(state.depth.is_some())
-            .depth_write_enable(state.depth.is_some())
+            .depth_write_enable(state.depth.is_some() && state.keeps != Keeps::ColorOver)
             .depth_compare_op(vk::CompareOp::GREATER);
         let blend_attachments = [color_blend(state.keeps)];
         let blend = vk::PipelineColorBlendStateCreateInfo::default().attachments(&blend_attachments);
@@ -311,10 +313,14 @@ fn vertex_layout(
 fn color_blend(keeps: Keeps) -> vk::PipelineColorBlendAttachmentState {
     let operation = match keeps {
         Keeps::Largest => vk::BlendOp::MAX,
-        Keeps::Last | Keeps::Over => vk::BlendOp::ADD,
+        Keeps::Last | Keeps::Over | Keeps::ColorOver => vk::BlendOp::ADD,
+    };
+    let written = match keeps {
+        Keeps::ColorOver => vk::ColorComponentFlags::R | vk::ColorComponentFlags::G | vk::ColorComponentFlags::B,
+        _ => vk::ColorComponentFlags::RGBA,
     };
     vk::PipelineColorBlendAttachmentState::default()
-        .color_write_mask(vk::ColorComponentFlags::RGBA)
+        .color_write_mask(written)
         .blend_enable(keeps != Keeps::Last)
         .src_color_blend_factor(vk::BlendFactor::ONE)
         .dst_color_blend_factor(vk::BlendFactor::ONE_MINUS_SRC_ALPHA)

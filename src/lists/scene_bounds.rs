@@ -99,6 +99,8 @@ pub struct OutlineView {
     pub field: Arc<SilhouetteField>,
     /// Rotation from the world to the object.
     pub to_object: DQuat,
+    /// Whether no light passes within it.
+    pub opaque: bool,
 }
 
 /// A light as the gather sees it.

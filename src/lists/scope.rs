@@ -12,6 +12,7 @@ use crate::lists::scene_bounds::{ClusterBounds, EntityBounds, ListLight, SceneBo
 use crate::lists::skip::{CAP_SINES, SKIP_FADE_RAD};
 use crate::lists::tree::Crowd;
 use glam::{DVec2, DVec3};
+use std::f64::consts::PI;
 
 /// What an outline's distance may be off by, in r: more than the step of a map and what blending four of them errs by.
 const OUTLINE_MARGIN: f64 = 0.06;
@@ -162,7 +163,7 @@ impl<'m> Scope<'m> {
             scene,
             index,
             near,
-            reflectance: receiver.reflectance.into(),
+            reflectance: PI * f64::from(receiver.albedo.into_iter().fold(0.0, f32::max)),
             centre: vector([x, y, z]) + to_world(receiver, vector(bounds.centre) * scale),
             radius_m: f64::from(bounds.radius_m) * scale,
             axis: to_world(receiver, vector(bounds.axis)),
@@ -178,7 +179,7 @@ impl<'m> Scope<'m> {
 
     /// Whether the own visibility of the cluster has the shadows of an occluder, those of sharp lights or all others.
     pub fn is_own(&self, occluder: usize, sharp: bool) -> bool {
-        self.scene.groups.as_ref().is_some_and(|groups| groups.share(self.index, occluder))
+        self.scene.groups.as_ref().is_some_and(|groups| groups.is_own(self.index, occluder))
             && (!sharp || self.near.binary_search(&(occluder as u32)).is_ok())
     }
 
@@ -353,7 +354,7 @@ impl<'m> Scope<'m> {
             && distance - along - INSIDE[1] * radius_m - f64::from(light_radius) > 0.0;
         match found {
             found if skip.passed && found < -clear => CullResult::PassedBy,
-            found if skip.covered && between && found > clear => CullResult::Covered,
+            found if skip.covered && outline.opaque && between && found > clear => CullResult::Covered,
             _ => CullResult::Listed,
         }
     }
@@ -429,7 +430,6 @@ mod tests {
 
     #[test]
     fn angles_add_up_to_half_a_turn() {
-        use std::f64::consts::PI;
         let mut rng = fastrand::Rng::with_seed(6);
         for _ in 0..10_000 {
             let a = PI * rng.f64();

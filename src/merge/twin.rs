@@ -31,6 +31,8 @@ pub struct MergeObject<'f> {
     pub radiance: Option<&'f ShadowField>,
     /// The rectangle that blocks in place of a field.
     pub sheet: Option<Sheet>,
+    /// Share of light that it keeps back where it blocks.
+    pub opacity: f64,
 }
 
 /// One receiver under all lights.
@@ -89,14 +91,15 @@ impl MergeTwin<'_> {
             .iter()
             .map(|&j| {
                 if let Some(sheet) = sheet(j) {
-                    return (j, sheet_above_horizon(&sheet, normal, self.skip), self.sheet_blocked(&sheet), None);
+                    let reach = self.objects[j].opacity * sheet_above_horizon(&sheet, normal, self.skip);
+                    return (j, reach, self.sheet_blocked(&sheet), None);
                 }
                 let share = cones[j].field_share(self.skip);
                 let blocked = self.field(j, position, None, rotations).map(|b| b * share);
                 let object = &self.objects[j];
                 let area = || object.area.at(object.rotation.inverse() * cones[j].toward);
                 let cap = (share < 1.0).then(|| cones[j].cap(area()).by(1.0 - share));
-                (j, cones[j].above_horizon(normal, self.skip), blocked, cap)
+                (j, object.opacity * cones[j].above_horizon(normal, self.skip), blocked, cap)
             })
             .collect();
         // The chain of the occluders, each as much as `share` says.

@@ -126,7 +126,7 @@ impl SceneBuilder {
             named.push(MeshData::new(name, generator));
         }
         let mut textures: Vec<TextureData> = Vec::with_capacity(painted.len());
-        for (name, Texture { wrap, factor, alpha_cutoff, .. }) in &painted {
+        for (name, Texture { wrap, factor, alpha_cutoff, alpha_blend, .. }) in &painted {
             let data = TextureData {
                 name: name.clone(),
                 file: None,
@@ -134,6 +134,7 @@ impl SceneBuilder {
                 wrap: *wrap,
                 factor: *factor,
                 alpha_cutoff: *alpha_cutoff,
+                alpha_blend: *alpha_blend,
             };
             let fail = |what| Error::Input(format!("texture {:?}: {what}", data.name));
             data.check(&textures).map_err(fail)?;

@@ -233,9 +233,12 @@ pub struct TextureData {
     /// Linear, 0 to 1. The default is 1.
     #[serde(default = "white", deserialize_with = "values::albedo")]
     pub factor: Vec3,
-    /// Places whose alpha is less are not drawn, 0 to 1. By default all are.
+    /// Places whose alpha is less are holes, 0 to 1. By default there are none.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub alpha_cutoff: Option<f32>,
+    /// Whether its alpha is the opacity of a place, in place of a cutoff. By default it is not.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub alpha_blend: bool,
 }
 
 impl TextureData {
@@ -249,6 +252,9 @@ impl TextureData {
         }
         if self.alpha_cutoff.is_some_and(|alpha| !(0.0..=1.0).contains(&alpha)) {
             return Err("alpha_cutoff is not within 0 to 1".into());
+        }
+        if self.alpha_blend && self.alpha_cutoff.is_some() {
+            return Err("it has either an alpha_cutoff or alpha_blend".into());
         }
         Ok(())
     }
@@ -416,6 +422,10 @@ pub struct EntityData {
     /// Textures of a glossy surface besides its albedo.
     #[serde(default, skip_serializing_if = "Maps::is_empty")]
     pub maps: Maps,
+    /// Share of light that does not pass, 0 to 1: less than 1 for glass and for what is blended with what lies behind
+    /// it. The default is 1.
+    #[serde(default = "values::one", deserialize_with = "values::share", skip_serializing_if = "is_opaque")]
+    pub opacity: f32,
     /// Linear radiance in W m^-2 sr^-1, at most 1e15. It multiplies the colours of a mesh that has them. The default is
     /// 0.
     #[serde(default, deserialize_with = "values::radiance")]
@@ -437,6 +447,10 @@ pub struct EntityData {
     pub motion: Vec<Motion>,
 }
 
+fn is_opaque(opacity: &f32) -> bool {
+    *opacity >= 1.0
+}
+
 fn grey() -> Albedo {
     Albedo::Color(Vec3::splat(0.7))
 }
@@ -453,6 +467,7 @@ impl EntityData {
             albedo: grey(),
             gloss: None,
             maps: Maps::default(),
+            opacity: values::one(),
             emission: Vec3::ZERO,
             spot: None,
             emits: None,

@@ -10,6 +10,8 @@ pub struct Groups {
     of: Vec<u32>,
     /// Whether each entity is lit.
     receives: Vec<bool>,
+    /// Whether each lets light through, so that it stands before all others as something that moves does.
+    transparent: Vec<bool>,
     /// How many members of each group are lit.
     receivers: Vec<u32>,
     /// How many entities are lit.
@@ -43,7 +45,8 @@ impl Groups {
         for (&group, &lit) in of.iter().zip(&receives) {
             receivers[group as usize] += u32::from(lit);
         }
-        Groups { receiver_count: receivers.iter().sum(), of, receives, receivers }
+        let transparent = scene.entities.iter().map(|entity| entity.transparent).collect();
+        Groups { receiver_count: receivers.iter().sum(), of, receives, transparent, receivers }
     }
 
     /// Whether the shadow or light of an entity can fall on another entity, because one other at least is lit.
@@ -54,11 +57,13 @@ impl Groups {
     /// Whether they can fall on an entity of another group.
     pub fn is_seen_by_others(&self, entity: usize) -> bool {
         self.receiver_count > self.receivers[self.of[entity] as usize]
+            || (self.transparent[entity] && self.is_seen(entity))
     }
 
-    /// Whether two entities never move against each other.
-    pub fn share(&self, a: usize, b: usize) -> bool {
-        self.of[a] == self.of[b]
+    /// Whether a receiver's own visibility has the shadow of an occluder: they never move against each other, and it
+    /// lets no light through.
+    pub fn is_own(&self, receiver: usize, occluder: usize) -> bool {
+        self.of[receiver] == self.of[occluder] && !self.transparent[occluder]
     }
 
     /// The members of every group, in order.
@@ -94,7 +99,7 @@ mod tests {
         let mut scene = scene("");
         let groups = Groups::new(&scene, Lights::Sharp);
         assert_eq!(groups.members(), [vec![0, 2, 3], vec![1]]);
-        assert!(groups.share(0, 3) && !groups.share(0, 1));
+        assert!(groups.is_own(0, 3) && !groups.is_own(0, 1));
         scene.loosen(0);
         assert_eq!(Groups::new(&scene, Lights::Sharp).members(), [vec![0], vec![1], vec![2, 3]]);
         assert_eq!(Groups::alone(&scene).members(), [[0], [1], [2], [3]]);

@@ -28,6 +28,7 @@ use serde::Deserialize;
 use toml::Spanned;
 
 use crate::asset::environment::{Environment, EnvironmentData};
+use crate::asset::pierce::pierced;
 use crate::asset::texture::{Texels, Texture};
 use crate::asset::{Mesh, embedded, obj, read_file, utf8};
 use crate::error::{Error, Result};
@@ -54,6 +55,8 @@ pub struct Scene {
     pub meshes: Vec<Arc<Mesh>>,
     /// Textures in the file's order.
     pub textures: Vec<Arc<Texture>>,
+    /// What textures leave of meshes in which they make holes.
+    casters: HashMap<usize, Arc<Mesh>>,
     /// Entities in the file's order, with their switches resolved, and then suns. [`Scene::at`] gives their placements.
     pub entities: Vec<Entity>,
     /// The surface of each entity ([`Scene::surface`]); empty where all are the meshes themselves.
@@ -83,6 +86,11 @@ pub struct Entity {
     pub gloss: Option<Gloss>,
     /// Its textures besides the albedo's, if it is glossy and has texture coordinates.
     pub maps: MapIndices,
+    /// Share of light that it keeps back within its outline, 0 to 1; where a texture varies it, the mean over the
+    /// surface.
+    pub opacity: f32,
+    /// Whether it is drawn over what lies behind it, because light passes places of it that are no holes.
+    pub transparent: bool,
     /// Linear radiance in W m^-2 sr^-1. It is multiplied by the mesh's colours, if there are any.
     pub emission: Vec3,
     /// The cone of its light, if it is a spot.
@@ -207,6 +215,7 @@ impl Scene {
             data,
             meshes,
             textures,
+            casters: HashMap::new(),
             entities,
             surfaces: Vec::new(),
             loose: BTreeSet::new(),
@@ -214,8 +223,24 @@ impl Scene {
             environment,
             camera_added: false,
         };
+        scene.cut_casters();
         scene.place_suns();
         scene
+    }
+
+    /// Cuts the holes of masked entities out of what casts their shadows. Of entities with one mesh the last decides.
+    fn cut_casters(&mut self) {
+        let masked =
+            (0..self.entities.len()).filter_map(|entity| Some((self.entities[entity].mesh, self.mask(entity)?)));
+        let masks: HashMap<usize, &Arc<Texture>> = masked.collect();
+        let cut =
+            |(mesh, texture): (usize, &Arc<Texture>)| Some((mesh, Arc::new(pierced(&self.meshes[mesh], texture)?)));
+        self.casters = masks.into_iter().filter_map(cut).collect();
+    }
+
+    /// The mesh that casts the shadows of entities of a mesh: itself, or what a texture leaves of it.
+    pub(crate) fn caster(&self, mesh: usize) -> &Arc<Mesh> {
+        self.casters.get(&mesh).unwrap_or(&self.meshes[mesh])
     }
 
     /// The mesh of an entity as it is lit and drawn: its own, or a finer one of the same shape.
@@ -263,12 +288,34 @@ impl Scene {
         (texture.texels.is_some() && mesh.uvs.is_some() || mesh.tints.is_some()).then_some(texture)
     }
 
+    /// The texture whose holes light passes, of an entity that has such.
+    pub(crate) fn mask(&self, entity: usize) -> Option<&Arc<Texture>> {
+        let Entity { mesh, texture, .. } = self.entities[entity];
+        let texture = &self.textures[texture?];
+        (texture.alpha_cutoff.is_some() && texture.texels.is_some() && self.meshes[mesh].uvs.is_some())
+            .then_some(texture)
+    }
+
     /// Reflectance of an entity at a place of a triangle of its mesh over the entity's mean, by colour.
     pub(crate) fn over_mean(&self, entity: usize, corners: [u32; 3], weights: [f32; 3]) -> Vec3 {
         let Some(texture) = self.paint(entity) else { return Vec3::ONE };
         let Entity { mesh, albedo: mean, .. } = self.entities[entity];
-        let found = texture.at(&self.meshes[mesh], corners, weights);
+        // What passes is not reflected: the mean of what blends is over the whole surface.
+        let alpha = if texture.alpha_blend { texture.opacity_at(&self.meshes[mesh], corners, weights) } else { 1.0 };
+        let found = alpha * texture.at(&self.meshes[mesh], corners, weights);
         Vec3::from_array(std::array::from_fn(|c| if mean[c] > 0.0 { found[c] / mean[c] } else { 0.0 }))
+    }
+
+    /// Share of light that an entity keeps back, but for its texture.
+    pub(crate) fn opacity(&self, entity: usize) -> f32 {
+        self.data.entities.get(entity).map_or(1.0, |data| data.opacity)
+    }
+
+    /// Share of light that an entity keeps back at a place of a triangle of its mesh.
+    pub(crate) fn opacity_at(&self, entity: usize, corners: [u32; 3], weights: [f32; 3]) -> f32 {
+        let Entity { mesh, texture, .. } = self.entities[entity];
+        self.opacity(entity)
+            * texture.map_or(1.0, |index| self.textures[index].opacity_at(&self.meshes[mesh], corners, weights))
     }
 
     /// How an entity reflects at a place of a triangle of its mesh, whose normal there is `normal`, and the normal as its
@@ -337,11 +384,19 @@ impl Scene {
         let paint = if is_repainted {
             Paint::new(&data.albedo, &self.data, &self.textures, &self.meshes[mesh])
         } else {
-            Paint { texture: self.entities[index].texture, mean: self.entities[index].albedo }
+            let &Entity { texture, albedo, .. } = &self.entities[index];
+            Paint {
+                texture,
+                mean: albedo,
+                opacity: texture.map_or(1.0, |t| self.textures[t].mean_opacity(&self.meshes[mesh])),
+            }
         };
         let coat = Coat::new(&data, &self.data, &self.textures, &self.meshes[mesh]);
-        self.entities[index] = resolve(index, &data, mesh, paint, coat);
+        self.entities[index] = resolve(index, &data, mesh, paint, coat, &self.textures);
         self.data.entities[index] = data;
+        if is_repainted {
+            self.cut_casters();
+        }
     }
 
     /// Replaces the data of the distant light; its picture stays the same.
@@ -393,7 +448,7 @@ fn resolve_all(
                 .or_insert_with(|| Paint::new(&entity.albedo, data, textures, &meshes[mesh])),
         };
         let coat = Coat::new(entity, data, textures, &meshes[mesh]);
-        entities.push(resolve(i, entity, mesh, paint, coat));
+        entities.push(resolve(i, entity, mesh, paint, coat, textures));
     }
     Ok(entities)
 }
@@ -404,22 +459,24 @@ fn check_spot(data: &EntityData, mesh: &Mesh) -> std::result::Result<(), &'stati
     if data.spot.is_some() && has_colors { Err("a spot takes a mesh without colours of its own") } else { Ok(()) }
 }
 
-/// The texture of an entity, and its mean reflectance.
+/// The texture of an entity, its mean reflectance and its mean opacity.
 #[derive(Clone, Copy)]
 struct Paint {
     texture: Option<usize>,
     mean: Vec3,
+    opacity: f32,
 }
 
 impl Paint {
     /// The paint that an albedo is on a mesh. One that names no texture is grey.
     fn new(albedo: &Albedo, data: &Data, textures: &[Arc<Texture>], mesh: &Mesh) -> Self {
         match albedo {
-            Albedo::Color(color) => Paint { texture: None, mean: *color },
+            Albedo::Color(color) => Paint { texture: None, mean: *color, opacity: 1.0 },
             Albedo::Texture(name) => {
                 let texture = data.textures.iter().position(|texture| texture.name == *name);
                 let mean = texture.map_or(Vec3::splat(0.7), |texture| textures[texture].mean(mesh));
-                Paint { texture, mean: mean.min(Vec3::ONE) }
+                let opacity = texture.map_or(1.0, |texture| textures[texture].mean_opacity(mesh));
+                Paint { texture, mean: mean.min(Vec3::ONE), opacity }
             }
         }
     }
@@ -459,7 +516,14 @@ impl Coat {
 }
 
 /// Resolves the switches. By default, an entity emits if it has emission, occludes unless it emits, and receives.
-fn resolve(index: usize, data: &EntityData, mesh: usize, paint: Paint, coat: Coat) -> Entity {
+fn resolve(
+    index: usize,
+    data: &EntityData,
+    mesh: usize,
+    paint: Paint,
+    coat: Coat,
+    textures: &[Arc<Texture>],
+) -> Entity {
     let emits = data.emits.unwrap_or(data.emission != Vec3::ZERO);
     Entity {
         name: data.name.clone().unwrap_or_else(|| format!("entity {index}")),
@@ -468,6 +532,8 @@ fn resolve(index: usize, data: &EntityData, mesh: usize, paint: Paint, coat: Coa
         texture: paint.texture,
         gloss: coat.gloss,
         maps: coat.maps,
+        opacity: data.opacity * paint.opacity,
+        transparent: data.opacity < 1.0 || paint.texture.is_some_and(|texture| textures[texture].alpha_blend),
         emission: data.emission,
         spot: data.spot,
         emits,
@@ -507,8 +573,9 @@ fn read_textures(
             pictures.insert((file, texture.image), texels.clone());
             Ok(texels)
         });
-        let &TextureData { wrap, factor, alpha_cutoff, .. } = texture;
-        textures.push(Arc::new(Texture { texels: texels.transpose().map_err(fail)?, wrap, factor, alpha_cutoff }));
+        let &TextureData { wrap, factor, alpha_cutoff, alpha_blend, .. } = texture;
+        let texels = texels.transpose().map_err(fail)?;
+        textures.push(Arc::new(Texture { texels, wrap, factor, alpha_cutoff, alpha_blend }));
     }
     Ok(textures)
 }

@@ -45,6 +45,8 @@ impl Scene {
                 texture: None,
                 gloss: None,
                 maps: MapIndices::default(),
+                opacity: 1.0,
+                transparent: false,
                 emission: (radiance / share).as_vec3(),
                 spot: None,
                 emits: radiance != DVec3::ZERO,

@@ -121,13 +121,13 @@ struct Packing {
 
 impl Packing {
     /// Adds one surface in the order of its clusters.
-    fn add(&mut self, device: &Arc<Device>, baked: &BakedSurface, glossy: bool) -> Result<DeviceSurface> {
+    fn add(&mut self, device: &Arc<Device>, baked: &BakedSurface, by_triangles: bool) -> Result<DeviceSurface> {
         let Packing { vertices, transfers, self_cells, stride, drawn } = self;
         let mesh = &baked.mesh;
         let (centre, _) = mesh.bounding_sphere();
         let vertex_first = vertices.len() as u32;
         let order = cluster_order(mesh);
-        let drawn = DrawnMesh::new(device, mesh, &order, *drawn, glossy)?;
+        let drawn = DrawnMesh::new(device, mesh, &order, *drawn, by_triangles)?;
         let steps = drawn.grid().map_or_else(|| mesh.steps(), |grid| vec![grid.step_m; order.len()]);
         let longest = || steps.iter().copied().fold(0.0, f32::max);
         let reach_m = drawn.grid().map_or_else(longest, |grid| grid.reach_m);
@@ -165,9 +165,10 @@ impl SceneBuffers {
     pub fn new(device: &Arc<Device>, scene: &Scene, options: &bake::Options, baked: BakedScene) -> Result<Self> {
         let (fields, slots) = field_atlas::field_atlas(device, scene, &baked.meshes, options)?;
         let (silhouettes, outlines) = Silhouettes::new(device, &baked.meshes)?;
-        let meshes = scene.meshes.iter().zip(slots).zip(outlines).map(|((mesh, [blocked, radiance]), silhouette)| {
-            let (centre, radius_m) = mesh.bounding_sphere();
-            let rectangle = mesh.rectangle();
+        let casters = (0..scene.meshes.len()).map(|mesh| scene.caster(mesh));
+        let meshes = casters.zip(slots).zip(outlines).map(|((caster, [blocked, radiance]), silhouette)| {
+            let (centre, radius_m) = caster.bounding_sphere();
+            let rectangle = caster.rectangle();
             let radius_m = f64::from(radius_m);
             DeviceMesh { blocked, radiance, silhouette, rectangle, centre_m: centre.as_dvec3(), radius_m }
         });
@@ -181,12 +182,12 @@ impl SceneBuffers {
             stride: channel_stride(options.bands),
             drawn: baked.surface_of.iter().map(|&surface| baked.surfaces[surface].mesh.positions.len()).sum(),
         };
-        let is_glossy = |surface: usize| {
+        let by_triangles = |surface: usize| {
             let mut entities = scene.entities.iter().zip(&baked.surface_of);
-            entities.any(|(entity, of)| *of == surface && entity.reflection().is_some())
+            entities.any(|(entity, of)| *of == surface && (entity.reflection().is_some() || entity.transparent))
         };
         let surfaces = baked.surfaces.iter().enumerate();
-        let surfaces = surfaces.map(|(index, surface)| packing.add(device, surface, is_glossy(index)));
+        let surfaces = surfaces.map(|(index, surface)| packing.add(device, surface, by_triangles(index)));
         let surfaces = surfaces.collect::<Result<_>>()?;
         let Packing { vertices, mut transfers, mut self_cells, .. } = packing;
         self_cells.resize(self_cells.len().max(2), [0; 2]);

@@ -20,6 +20,8 @@ pub struct SharpObject<'f> {
     pub silhouette: Option<&'f SilhouetteField>,
     /// The rectangle that blocks in place of an outline.
     pub sheet: Option<Sheet>,
+    /// Share of light that it keeps back where it blocks.
+    pub opacity: f64,
 }
 
 #[derive(Clone, Copy, Debug)]
@@ -89,7 +91,8 @@ impl SharpTwin<'_> {
         let receiver = &self.objects[self.receiver];
         let eye =
             SheetEye { position: point.position, normal: point.normal, receiver: (receiver.centre, receiver.radius_m) };
-        let sheets: Vec<_> = sheets.iter().flat_map(|object| object.sheet).map(|sheet| sheet.seen(&eye)).collect();
+        let sheets: Vec<_> =
+            sheets.iter().flat_map(|object| Some((object.sheet?.seen(&eye), object.opacity))).collect();
         let near = |object: &SharpObject<'_>, toward: DVec3| {
             let field = object.silhouette.expect("what blocks or shines by its outline has a silhouette field");
             let local = |v: DVec3| object.rotation.inverse() * v;
@@ -105,12 +108,15 @@ impl SharpTwin<'_> {
             let own = share.is_none().then(|| near(shining, toward));
             let part = |part: &LightPart| {
                 let pairs = occluders.iter().zip(&between);
-                let through: f64 =
-                    pairs.map(|(object, near)| 1.0 - blocked(object, near, part, part.distance)).product();
-                let past_sheets = sheets.iter().fold(SheetShadow::NONE, |shadow, sheet| {
+                let through: f64 = pairs
+                    .map(|(object, near)| 1.0 - object.opacity * blocked(object, near, part, part.distance))
+                    .product();
+                let past_sheets = sheets.iter().fold(SheetShadow::NONE, |shadow, (sheet, opacity)| {
                     let slope = sheet.slope(seen.facing().unwrap_or(part.toward));
                     let least_m = BEYOND * seen.sine * seen.distance;
-                    shadow.behind(sheet.shadow(part.toward, part.distance, part.sine, slope, least_m))
+                    let mut own = sheet.shadow(part.toward, part.distance, part.sine, slope, least_m);
+                    own.free = 1.0 - opacity * (1.0 - own.free);
+                    shadow.behind(own)
                 });
                 let covers =
                     share.unwrap_or(0.0) + own.as_ref().map_or(0.0, |near| blocked(shining, near, part, f64::INFINITY));

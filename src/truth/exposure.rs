@@ -40,7 +40,8 @@ pub fn exposure_ev(scene: &Scene, time_s: f64, aspect: f64) -> Option<f32> {
     let shapes = RayMeshes::new(scene);
     let world = World::new(scene, &shapes, &scene.at(time_s));
     let eye = Eye::new(&world, size);
-    let seen: Vec<_> = (0..size[0] * size[1]).filter_map(|pixel| Some((pixel, eye.seen(pixel, [0.5; 2])?))).collect();
+    let seen: Vec<_> =
+        (0..size[0] * size[1]).filter_map(|pixel| Some((pixel, eye.seen(pixel, [0.5; 2]).pop()?))).collect();
     let receiving = seen.iter().filter(|(_, seen)| scene.entities[seen.entity].receives);
     let points: Vec<_> =
         receiving.map(|(pixel, seen)| (Vertex { entity: seen.entity, index: *pixel as usize }, seen.view)).collect();

@@ -40,6 +40,8 @@ pub struct Seen {
     pub ground: DVec3,
     /// Reflectance there over the mean of the entity's, by colour.
     pub over_mean: DVec3,
+    /// Share of light from behind that it keeps back.
+    pub opacity: f64,
 }
 
 impl<'w> Eye<'w> {
@@ -55,22 +57,32 @@ impl<'w> Eye<'w> {
         }
     }
 
-    /// What a pixel, counted row by row from the top left, shows at a place within it, (0, 0) to (1, 1).
-    pub fn seen(&self, pixel: u32, place: [f64; 2]) -> Option<Seen> {
+    /// What a pixel, counted row by row from the top left, shows at a place within it, (0, 0) to (1, 1): from near to
+    /// far, up to what lets no light through.
+    pub fn seen(&self, pixel: u32, place: [f64; 2]) -> Vec<Seen> {
         let [width, _] = self.size;
         let direction = (self.direction)([f64::from(pixel % width) + place[0], f64::from(pixel / width) + place[1]]);
         let world = self.world;
         let met = self.sights.iter().filter_map(|sight| Some((sight, world.first_hit_m(sight, direction)?)));
-        let (sight, _) = met.min_by(|a, b| a.1.total_cmp(&b.1))?;
+        let mut met: Vec<(&EntityView, f64)> = met.collect();
+        met.sort_by(|a, b| a.1.total_cmp(&b.1));
+        let is_opaque = |(sight, _): &(&EntityView, f64)| !world.scene.entities[sight.entity].transparent;
+        let count = met.iter().position(is_opaque).map_or(met.len(), |last| last + 1);
+        met[..count].iter().filter_map(|(sight, _)| self.surface(sight, direction)).collect()
+    }
+
+    /// An entity where a ray meets it first.
+    fn surface(&self, sight: &EntityView, direction: DVec3) -> Option<Seen> {
+        let world = self.world;
         let entity = sight.entity;
-        let SurfaceHit { place, normal, over_mean, gloss, tilted } = world.surface_hit(sight, direction)?;
+        let SurfaceHit { place, normal, over_mean, gloss, tilted, opacity } = world.surface_hit(sight, direction)?;
         let emission = match world.scene.entities[entity].emission.as_dvec3() {
             DVec3::ZERO => DVec3::ZERO,
             emission => emission * world.emission(sight, direction).unwrap_or(DVec3::ZERO),
         };
         let view = world.surface(entity, place, tilted);
         let ground = (world.entities[entity].rotation * normal).normalize();
-        Some(Seen { entity, view, toward: -direction, emission, gloss, ground, over_mean })
+        Some(Seen { entity, view, toward: -direction, emission, gloss, ground, over_mean, opacity })
     }
 }
 
@@ -79,7 +91,7 @@ impl<'w> Eye<'w> {
 pub fn lit_points(world: &World<'_>, [width, height]: [u32; 2]) -> Vec<(Vertex, VertexView)> {
     let eye = Eye::new(world, [width, height]);
     let surface = |pixel: u32| {
-        let Seen { entity, view, .. } = eye.seen(pixel, ONE[0])?;
+        let Seen { entity, view, .. } = eye.seen(pixel, ONE[0]).pop()?;
         let entity_data = &world.scene.entities[entity];
         (entity_data.receives && !entity_data.emits).then_some((Vertex { entity, index: pixel as usize }, view))
     };
@@ -129,21 +141,28 @@ pub fn picture(
     let pixel = |pixel: u32| {
         let mut of_pixel = [DVec3::ZERO; 4];
         for (index, place) in places.iter().enumerate() {
-            let seen = eye.seen(pixel, *place);
-            let mut radiance = seen.as_ref().map_or(background, |seen| seen.emission);
-            if let Some(seen) = seen.filter(|seen| scene.entities[seen.entity].receives) {
+            let mut radiance = DVec3::ZERO;
+            let mut free = 1.0;
+            for seen in eye.seen(pixel, *place) {
+                radiance += free * seen.emission;
+                let before = free;
+                free *= 1.0 - seen.opacity;
+                if !scene.entities[seen.entity].receives {
+                    continue;
+                }
                 let key = Vertex { entity: seen.entity, index: pixel as usize * places.len() + index };
                 let entity = &scene.entities[seen.entity];
                 let base = seen.over_mean * entity.albedo.as_dvec3();
                 let surface = Reflection::seen(base, seen.gloss, seen.view.normal, seen.toward, cast.single_scatter)
                     .on(seen.ground);
                 let Estimate { radiosity, error } = caster.reflected(&seen.view, &surface, key);
-                let radiosity = DVec3::from(radiosity);
-                let error = DVec3::from(error);
+                let radiosity = before * DVec3::from(radiosity);
+                let error = before * DVec3::from(error);
                 radiance += radiosity;
                 of_pixel[2] += radiosity * radiosity;
                 of_pixel[3] += error * error;
             }
+            radiance += free * background;
             of_pixel[0] += radiance.min(DVec3::splat(white));
             of_pixel[1] += radiance;
         }

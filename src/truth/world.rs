@@ -3,11 +3,16 @@
 use super::Vertex;
 use super::ray_mesh::{RayMesh, RayMeshes};
 use super::sequence::Axes;
+use crate::asset::texture::Texture;
 use crate::bake::TRANSFER_OFFSET;
 use crate::field::lattice::cap_height;
 use crate::field::sheet::{self, Rectangle, Sheet, SheetEye, SheetView};
 use crate::scene::{Gloss, Placement, Scene};
 use glam::{DMat3, DVec3, Mat3A, Vec3A};
+use std::sync::Arc;
+
+/// Holes that a ray passes at most.
+const MOST_HOLES: usize = 32;
 
 pub struct PlacedEntity<'s> {
     pub mesh: &'s RayMesh,
@@ -129,12 +134,12 @@ impl<'s> World<'s> {
 
     /// Whether an occluder is a rectangle.
     pub fn is_sheet(&self, occluder: usize) -> bool {
-        self.scene.meshes[self.scene.entities[occluder].mesh].rectangle().is_some()
+        self.scene.caster(self.scene.entities[occluder].mesh).rectangle().is_some()
     }
 
     /// An occluder as a vertex sees it, where it is a rectangle.
     pub fn sheet(&self, occluder: usize, view: &VertexView) -> Option<SheetView> {
-        let Rectangle { axes, half_m } = self.scene.meshes[self.scene.entities[occluder].mesh].rectangle()?;
+        let Rectangle { axes, half_m } = self.scene.caster(self.scene.entities[occluder].mesh).rectangle()?;
         let PlacedEntity { centre, radius_m, rotation, .. } = self.entities[occluder];
         let own_radius_m = f64::from(self.scene.meshes[self.scene.entities[occluder].mesh].bounding_sphere().1);
         let half_m = half_m.map(|half| half * radius_m / own_radius_m);
@@ -167,7 +172,12 @@ impl<'s> World<'s> {
         let direction = direction.as_vec3a();
         let placed = &self.entities[sight.entity];
         let limit = (limit_m / placed.radius_m) as f32;
-        sight.entry(direction, 1.0).is_some_and(|sphere| sphere < limit)
+        if self.scene.mask(sight.entity).is_some() {
+            let met = self.corners_hit(sight.entity, sight.origin, sight.to_object * direction);
+            return met.is_some_and(|(distance, ..)| distance < limit);
+        }
+        !self.lets_through(sight.entity, direction)
+            && sight.entry(direction, 1.0).is_some_and(|sphere| sphere < limit)
             && (sight.entry(direction, placed.mesh.inner_radius).is_some_and(|inner| inner > 0.0 && inner < limit)
                 || placed.mesh.blocks(sight.origin, sight.to_object * direction, limit))
     }
@@ -177,14 +187,48 @@ impl<'s> World<'s> {
         view.own.as_ref().is_some_and(|own| {
             let placed = &self.entities[own.entity];
             let local = own.to_object * direction.as_vec3a();
-            placed.mesh.blocks(own.origin, local, (limit_m / placed.radius_m) as f32)
+            let limit = (limit_m / placed.radius_m) as f32;
+            let entity = &self.scene.entities[own.entity];
+            match self.scene.mask(own.entity) {
+                Some(_) => {
+                    self.corners_hit(own.entity, own.origin, local).is_some_and(|(distance, ..)| distance < limit)
+                }
+                None => !entity.transparent && placed.mesh.blocks(own.origin, local, limit),
+            }
         })
+    }
+
+    /// Whether a ray is one of those that a transparent entity lets through. A hash of its direction decides: of many
+    /// rays, their share.
+    fn lets_through(&self, entity: usize, direction: Vec3A) -> bool {
+        let of = &self.scene.entities[entity];
+        let bits = direction.to_array().map(|c| u64::from(c.to_bits()));
+        let seed = bits[0] ^ bits[1] << 20 ^ bits[2] << 40 ^ (entity as u64) << 52;
+        of.transparent && fastrand::Rng::with_seed(seed).f32() >= of.opacity
+    }
+
+    /// The first place of an entity, no hole, that a ray of its own frame meets: the distance, the triangle and the
+    /// weights of its corners.
+    fn corners_hit(&self, entity: usize, origin: Vec3A, direction: Vec3A) -> Option<(f32, usize, [f32; 3])> {
+        let shape = self.entities[entity].mesh;
+        let mesh = &self.scene.meshes[self.scene.entities[entity].mesh];
+        let mask = self.scene.mask(entity);
+        let mut passed = 0.0;
+        for _ in 0..MOST_HOLES {
+            let (distance, triangle, weights) = shape.corners_hit(origin + passed * direction, direction)?;
+            let is_hole = |mask: &Arc<Texture>| mask.opacity_at(mesh, mesh.triangles[triangle], weights) < 0.5;
+            if !mask.is_some_and(is_hole) {
+                return Some((passed + distance, triangle, weights));
+            }
+            passed += distance + 1e-5;
+        }
+        None
     }
 
     /// The surface where a ray (unit direction) meets the entity first; `None` if it misses.
     pub fn surface_hit(&self, sight: &EntityView, direction: DVec3) -> Option<SurfaceHit> {
         let direction = sight.to_object * direction.as_vec3a();
-        let (distance, triangle, weights) = self.entities[sight.entity].mesh.corners_hit(sight.origin, direction)?;
+        let (distance, triangle, weights) = self.corners_hit(sight.entity, sight.origin, direction)?;
         let mesh = &self.scene.meshes[self.scene.entities[sight.entity].mesh];
         let corners = mesh.triangles[triangle];
         let normal: DVec3 =
@@ -197,22 +241,30 @@ impl<'s> World<'s> {
             over_mean: self.scene.over_mean(sight.entity, corners, weights).as_dvec3(),
             gloss,
             tilted: tilted.as_dvec3(),
+            opacity: f64::from(self.scene.opacity_at(sight.entity, corners, weights)),
         })
     }
 
-    /// The first surface that a ray (unit direction) from a point of a surface meets, of entities that occlude.
+    /// The first surface that a ray (unit direction) from a point of a surface meets, of entities that occlude. What is
+    /// transparent keeps its share of rays back and reflects none.
     pub fn first_surface(&self, view: &VertexView, direction: DVec3) -> Option<(usize, SurfaceHit)> {
         let others = self.occluders(view);
-        let met =
-            others.iter().chain(view.own()).filter_map(|sight| Some((sight, self.first_hit_m(sight, direction)?)));
-        let (sight, _) = met.min_by(|a, b| a.1.total_cmp(&b.1))?;
-        Some((sight.entity, self.surface_hit(sight, direction)?))
+        let (panes, others): (Vec<_>, Vec<_>) =
+            others.iter().chain(view.own()).partition(|sight| self.scene.entities[sight.entity].transparent);
+        let met = others.into_iter().filter_map(|sight| Some((sight, self.first_hit_m(sight, direction)?)));
+        let (sight, limit_m) = met.min_by(|a, b| a.1.total_cmp(&b.1))?;
+        let is_kept_back = panes.iter().any(|pane| self.blocks(pane, direction, limit_m));
+        if is_kept_back { None } else { Some((sight.entity, self.surface_hit(sight, direction)?)) }
     }
 
     /// Distance in metres at which a ray (unit direction) meets the entity first; `None` if it misses.
     pub fn first_hit_m(&self, sight: &EntityView, direction: DVec3) -> Option<f64> {
         let placed = &self.entities[sight.entity];
-        let found = placed.mesh.first_hit(sight.origin, sight.to_object * direction.as_vec3a())?;
+        let direction = sight.to_object * direction.as_vec3a();
+        let found = match self.scene.mask(sight.entity) {
+            Some(_) => self.corners_hit(sight.entity, sight.origin, direction)?.0,
+            None => placed.mesh.first_hit(sight.origin, direction)?,
+        };
         Some(f64::from(found) * placed.radius_m)
     }
 
@@ -248,6 +300,8 @@ pub struct SurfaceHit {
     pub gloss: Option<Gloss>,
     /// The normal as a map tilts it.
     pub tilted: DVec3,
+    /// Share of light that it keeps back.
+    pub opacity: f64,
 }
 
 impl VertexView {

@@ -331,7 +331,7 @@ fn textures_multiply_the_light_of_a_grey_surface() {
         let rgba = vec![[255, 0, 0, 255], [0, 255, 0, 255], [0, 0, 255, 255], [255, 255, 255, 100]];
         let texels = Some(Arc::new(Texels { width: 2, height: 2, rgba }));
         let factor = Vec3::new(0.5, 1.0, 1.0);
-        let texture = Texture { texels, wrap: [Wrap::Clamp; 2], factor, alpha_cutoff: Some(0.5) };
+        let texture = Texture { texels, wrap: [Wrap::Clamp; 2], factor, alpha_cutoff: Some(0.5), alpha_blend: false };
         let lamp = Generator::Sphere { radius_m: 0.1, subdivisions: 2 };
         let environment = EnvironmentData { uniform: Some(Vec3::splat(0.2)), ..EnvironmentData::default() };
         let scene = Scene::builder()

@@ -108,7 +108,7 @@ fn entities_and_clusters_of_the_merge() {
                 radiance_base,
                 radial,
                 emission,
-                reflectance,
+                opacity,
                 shift,
                 albedo,
                 scale,

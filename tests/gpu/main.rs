@@ -23,3 +23,4 @@ mod skip;
 mod stability;
 #[path = "../common/stage.rs"]
 mod stage;
+mod transparent;

@@ -61,6 +61,7 @@ fn by_vertex(frame: &Frame, sorted: &Sort<'_>) -> (Vec<[f64; 3]>, BTreeMap<Vec<u
             blocked: fields[entity.mesh].as_ref(),
             area: device_mesh.blocked.as_ref().map_or(Default::default(), |slot| slot.area),
             radiance: None,
+            opacity: 1.0,
             sheet: None,
         }
     };

@@ -14,6 +14,7 @@
 //! | meshes compressed by Draco and meshoptimizer; KTX2 and WebP | as if they were not |
 //! | base colour factor | albedo |
 //! | base colour texture, colours of vertices, alpha mask | texture; tints of the mesh's vertices |
+//! | alpha blending, transmission | opacity, of transmission less the luminance of what passes: glass is thin and grey |
 //! | roughness, metal, index of refraction, specular factor | gloss |
 //! | textures of roughness and metal, of normals | maps |
 //! | emissive factor and strength; texture | emission; colours of the mesh's vertices, and a map |
@@ -187,7 +188,6 @@ pub(super) struct Reader {
     stage: Option<Rc<Stage>>,
     textures: Textures,
     primitives: HashMap<PartKey, Option<Primitive>>,
-    materials: BTreeSet<usize>,
     triangle_count: usize,
     notes: Notes,
 }
@@ -200,7 +200,6 @@ impl Reader {
             document,
             stage: None,
             primitives: HashMap::new(),
-            materials: BTreeSet::new(),
             triangle_count: 0,
             notes: Notes::default(),
         }
@@ -260,9 +259,6 @@ impl Reader {
         let primitive = shape.map(|shape| {
             let material = json.primitives[at].material.map(|material| material.value());
             let notes = &mut self.notes;
-            if let Some(material) = material.filter(|material| self.materials.insert(*material)) {
-                surface::note(&document.root.materials[material], notes);
-            }
             let surface = Surface::new(&document, material, &shape, &mut self.textures, notes)?;
             let own = json.name.clone().unwrap_or_else(|| format!("mesh {mesh}"));
             let name = if json.primitives.len() > 1 { format!("{own} {at}") } else { own };
@@ -387,7 +383,7 @@ impl Builder {
             return Ok(None);
         };
         let place = format!("nodes[{}]", stand.node);
-        let Surface { emission, gloss, maps, .. } = primitive.surface;
+        let Surface { emission, gloss, maps, opacity, .. } = primitive.surface;
         let has_pattern = primitive.surface.attributes.colors.is_some();
         let scale = parts.uniform_scale().map(|scale| scale as f32);
         if scale.is_some_and(|scale| !(1.0 / SCALE_LIMIT..=SCALE_LIMIT).contains(&scale)) {
@@ -410,6 +406,7 @@ impl Builder {
             albedo,
             gloss,
             maps: Maps { gloss: gloss_map, normal: normal_map, glow: glow_map },
+            opacity,
             emission,
             // What glows in places casts a shadow, and lights others where it is brighter than white on a screen.
             emits: (has_pattern && emission.max_element() <= 1.0).then_some(false),
@@ -430,7 +427,7 @@ impl Builder {
             let own = material.and_then(|index| self.reader.document.root.materials[index].name.clone());
             let own = own.unwrap_or_else(|| material.map_or("paint".into(), |index| format!("material {index}")));
             let is_free = |name: &String| self.textures.iter().all(|(data, _)| data.name != *name);
-            let Texture { wrap, factor, alpha_cutoff, .. } = paint.texture;
+            let Texture { wrap, factor, alpha_cutoff, alpha_blend, .. } = paint.texture;
             let data = TextureData {
                 name: free_name(&own, is_free),
                 file: paint.image.map(|_| self.file.clone()),
@@ -438,6 +435,7 @@ impl Builder {
                 wrap,
                 factor,
                 alpha_cutoff,
+                alpha_blend,
             };
             self.textures.push((data, Arc::new(paint.texture.clone())));
             self.textures.len() - 1
@@ -456,10 +454,11 @@ impl Builder {
                 wrap: map.wrap,
                 factor: Vec3::ONE,
                 alpha_cutoff: None,
+                alpha_blend: false,
             };
             let texels = self.reader.texels(map.image).ok();
-            self.textures
-                .push((data, Arc::new(Texture { texels, wrap: map.wrap, factor: Vec3::ONE, alpha_cutoff: None })));
+            let texture = Texture { texels, wrap: map.wrap, factor: Vec3::ONE, alpha_cutoff: None, alpha_blend: false };
+            self.textures.push((data, Arc::new(texture)));
             self.textures.len() - 1
         });
         self.textures[number].0.name.clone()

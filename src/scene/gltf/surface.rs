@@ -52,6 +52,8 @@ pub struct Surface {
     pub paint: Option<Paint>,
     /// How it reflects besides; an unlit surface does not.
     pub gloss: Option<Gloss>,
+    /// Share of light that does not pass; a texture may be another factor.
+    pub opacity: f32,
     /// Its textures for that: gloss, normal and emission.
     pub maps: [Option<Map>; 3],
     /// Linear radiance; candela per square metre are taken as W m^-2 sr^-1.
@@ -72,7 +74,7 @@ impl Surface {
         let default = Material::default();
         let json = material.map_or(&default, |index| &document.root.materials[index]);
         let place = material.map_or("the default material".to_owned(), |index| format!("materials[{index}]"));
-        let [r, g, b, _] = json.pbr_metallic_roughness.base_color_factor.0;
+        let [r, g, b, alpha] = json.pbr_metallic_roughness.base_color_factor.0;
         let mut albedo = Vec3::new(r, g, b);
         let mut attributes = Attributes::default();
         if let Some(colors) = shape.attribute(document, &Semantic::Colors(0), &[3, 4], 3)? {
@@ -87,12 +89,14 @@ impl Surface {
             return Err(document.fail(place, "its base colour is negative or not finite"));
         }
         let albedo = albedo.min(Vec3::ONE);
+        let (opacity, albedo) = passing(json, alpha, albedo);
         let info = json.pbr_metallic_roughness.base_color_texture.as_ref();
         let applied = info.map(|info| textures.applied(info, shape, notes)).transpose()?.flatten();
         let alpha_cutoff = match json.alpha_mode {
             Checked::Valid(AlphaMode::Mask) => Some(json.alpha_cutoff.map_or(0.5, |cutoff| cutoff.0.clamp(0.0, 1.0))),
             _ => None,
         };
+        let alpha_blend = matches!(json.alpha_mode, Checked::Valid(AlphaMode::Blend));
         let paint = (applied.is_some() || attributes.tints.is_some()).then(|| Paint {
             image: applied.as_ref().map(|applied| applied.image),
             texture: Texture {
@@ -100,6 +104,7 @@ impl Surface {
                 wrap: applied.as_ref().map_or_else(Default::default, |applied| applied.wrap),
                 factor: albedo,
                 alpha_cutoff,
+                alpha_blend: alpha_blend && applied.as_ref().is_some_and(|applied| applied.texels.has_alpha()),
             },
         });
         attributes.uvs = applied.and_then(|applied| applied.uvs);
@@ -131,8 +136,22 @@ impl Surface {
         let (emission, colors) = glow(document, json, &place, shape, textures, notes)?;
         maps[2] = of_emission.filter(|_| emission != Vec3::ZERO);
         attributes.colors = colors;
-        Ok(Surface { albedo, paint, gloss, maps, emission, attributes })
+        Ok(Surface { albedo, paint, gloss, opacity, maps, emission, attributes })
     }
+}
+
+/// The share of light that a material keeps back, and its base colour less what passes in place of being reflected.
+fn passing(json: &Material, alpha: f32, albedo: Vec3) -> (f32, Vec3) {
+    let alpha = match json.alpha_mode {
+        Checked::Valid(AlphaMode::Blend) => alpha.clamp(0.0, 1.0),
+        _ => 1.0,
+    };
+    let transmission = json.extensions.as_ref().and_then(|e| e.transmission.as_ref());
+    let transmission = transmission.map_or(0.0, |t| t.transmission_factor.0.clamp(0.0, 1.0));
+    // A metal lets nothing through.
+    let passes = transmission * (1.0 - json.pbr_metallic_roughness.metallic_factor.0.clamp(0.0, 1.0));
+    let luminance = albedo.dot(Vec3::new(0.2126, 0.7152, 0.0722));
+    (alpha * (1.0 - passes * luminance), alpha * (1.0 - passes) * albedo)
 }
 
 /// Metallic-roughness reflection; a texture that is no map counts by its mean.
@@ -188,15 +207,4 @@ fn glow(
         return Ok((emission, None));
     }
     Ok((emission, Some(colors)))
-}
-
-/// Counts what no surface of this program has, once a material that is used.
-pub fn note(json: &Material, notes: &mut Notes) {
-    let transmits = json.extensions.as_ref().is_some_and(|e| e.transmission.is_some());
-    if transmits || matches!(json.alpha_mode, Checked::Valid(AlphaMode::Blend)) {
-        notes.leave_out("transparent materials (they are opaque)");
-    }
-    if matches!(json.alpha_mode, Checked::Valid(AlphaMode::Mask)) {
-        notes.leave_out("shadows of masked materials (they are those of the whole shape)");
-    }
 }

@@ -265,7 +265,7 @@ fn usage() {
         ("--size", "10", "1280x720"),
         ("--size", "0x10", "1280x720"),
         ("--size", "-1x10", "1280x720"),
-        ("--lattice", "many", "cube:18x7"),
+        ("--lattice", "many", "cube:20x7"),
         ("--lattice", "cube:0x5", "at least 1"),
         ("--lattice", "cube:99999999x99999999", "4000000"),
         ("--lattice", "cube:4x5,inner=9,outer=2", "9"),

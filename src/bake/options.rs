@@ -5,7 +5,7 @@
 //! | quality | lattice | face | bands | format |
 //! |---|---|---|---|---|
 //! | draft | cube:8x3,edges=auto | 32 px | 3 | f16 |
-//! | normal | cube:18x7,edges=auto | 64 px | 4 | f16 |
+//! | normal | cube:20x7,edges=auto | 64 px | 4 | f16 |
 //! | high | cube:24x9,edges=auto | 128 px | 5 | f16 |
 //!
 //! Times, bytes and errors are in `docs/measured.md`. More samples do not help small lights in bands: the number
@@ -147,7 +147,7 @@ pub enum Quality {
     /// A tenth of the time and a seventh of the bytes; light in bands has 1.2 to 1.7 times the error: cube:8x3,edges=auto, 32 px,
     /// 3 bands
     Draft,
-    /// The default: cube:18x7,edges=auto, 64 px, 4 bands
+    /// The default: cube:20x7,edges=auto, 64 px, 4 bands
     #[default]
     Normal,
     /// 5 times the time and 4 times the bytes; light in bands has 0.54 to 0.84 of the error: cube:24x9,edges=auto, 128 px, 5

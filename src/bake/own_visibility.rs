@@ -12,9 +12,10 @@
 use super::packet::{BlockerHit, Blockers};
 use crate::field::quantity::channel_stride;
 use crate::field::self_visibility::{BYTES, LIMIT_RAD, NODES, encode_angle, encode_distance, frame, node_direction};
-use crate::sh::basis::{MAX_COEFFICIENTS, coefficient_count, evaluate};
+use crate::sh::basis::{MAX_BANDS, MAX_COEFFICIENTS, coefficient_count, evaluate};
 use crate::sh::lobe::clamped_cosine;
-use glam::{DMat3, DVec3, Mat3A, Vec3, Vec3A};
+use crate::sh::rotation::Rotation;
+use glam::{DMat3, DQuat, DVec3, Mat3A, Vec3, Vec3A};
 use std::f64::consts::{PI, TAU};
 use std::sync::LazyLock;
 
@@ -42,6 +43,16 @@ struct PatternRay {
     local: Vec3A,
     /// Cosine to the normal times solid angle.
     weight: f64,
+    /// The SH basis times the weight, in the normal's frame.
+    share: [f32; MAX_COEFFICIENTS],
+}
+
+impl PatternRay {
+    fn new(local: DVec3, weight: f64) -> Self {
+        let mut basis = [0.0; MAX_COEFFICIENTS];
+        evaluate(MAX_BANDS, local, &mut basis);
+        PatternRay { local: local.as_vec3a(), weight, share: basis.map(|y| (weight * y) as f32) }
+    }
 }
 
 /// A cell of the pattern, which has the ray of its number.
@@ -79,7 +90,7 @@ impl Pattern {
         // Edges that reach the horizon: these rays weigh nothing in the cosine.
         rays.extend((0..HORIZON).map(|i| {
             let turn = TAU * i as f64 / HORIZON as f64;
-            PatternRay { local: DVec3::new(turn.cos(), turn.sin(), HORIZON_HEIGHT).normalize().as_vec3a(), weight: 0.0 }
+            PatternRay::new(DVec3::new(turn.cos(), turn.sin(), HORIZON_HEIGHT).normalize(), 0.0)
         }));
         let low_pairs = (0..HORIZON).flat_map(|i| {
             let local = rays[PATTERN + i].local;
@@ -132,7 +143,7 @@ fn ray_of([x, y]: [usize; 2], side: usize) -> PatternRay {
         (at as f64 + within) / side as f64
     };
     let local = hemisphere(moved(x, y), moved(y, x));
-    PatternRay { local: local.as_vec3a(), weight: local.z * TAU / (side * side) as f64 }
+    PatternRay::new(local, local.z * TAU / (side * side) as f64)
 }
 
 fn rays(side: usize) -> Vec<PatternRay> {
@@ -298,12 +309,12 @@ pub fn see(blockers: &Blockers, standing: &Standing, eye: &Eye, bands: usize, ra
         counts,
     };
     let mut seen = Seen::default();
-    let mut blocked = [0.0; MAX_COEFFICIENTS];
-    let mut basis = [0.0; MAX_COEFFICIENTS];
+    // In the normal's frame, in which rays have the same coefficients for every point.
+    let mut local = [0.0_f32; MAX_COEFFICIENTS];
+    let count = coefficient_count(bands);
     let mut add = |ray: &PatternRay, hit: &Option<BlockerHit>| {
         let Some(found) = hit else { return };
-        evaluate(bands, to_object * ray.local.as_dvec3(), &mut basis);
-        blocked.iter_mut().zip(&basis).for_each(|(sum, y)| *sum += ray.weight * y);
+        local[..count].iter_mut().zip(&ray.share[..count]).for_each(|(sum, share)| *sum += share);
         seen.blocked += ray.weight / PI;
         seen.behind += if found.from_behind { ray.weight / PI } else { 0.0 };
     };
@@ -325,7 +336,9 @@ pub fn see(blockers: &Blockers, standing: &Standing, eye: &Eye, bands: usize, ra
     }
     seen.transfer = vec![0.0; channel_stride(bands)];
     let lobe = clamped_cosine(bands, normal);
-    for k in 0..coefficient_count(bands) {
+    let mut blocked = [0.0; MAX_COEFFICIENTS];
+    Rotation::new(bands, DQuat::from_mat3(&to_object)).apply(&local.map(f64::from), &mut blocked);
+    for k in 0..count {
         seen.transfer[k] = (lobe[k] - blocked[k]) as f32;
     }
     seen
@@ -457,27 +470,57 @@ impl CellHits {
         let nodes = &MANY_RAYS.nodes;
         let here = caster.map_distances(nodes, &caster.cast(nodes));
         let edges: Vec<(Vec3A, f32)> = self.edges(caster).iter().map(|edge| (edge.middle(), edge.away)).collect();
+        let mut close = Close { nearest: usize::MAX, places: Vec::new() };
         for (node, &toward) in nodes.iter().enumerate() {
-            let nearest = edges.iter().max_by(|a, b| a.0.dot(toward).total_cmp(&b.0.dot(toward)));
-            let angle = nearest.map_or(LIMIT_RAD, |(edge, _)| angle_to_edge(toward, *edge, &edges));
+            let nearest = nearest_to(toward, &edges);
+            let angle = nearest.map_or(LIMIT_RAD, |nearest| close.angle_to_edge(toward, nearest, &edges));
+            let nearest = nearest.map(|nearest| edges[nearest]);
             let free = here[node].is_infinite();
             map[node] = encode_angle(if free { angle } else { -angle });
-            let away = if free { nearest.map_or(f32::INFINITY, |(_, away)| *away) } else { here[node] };
+            let away = if free { nearest.map_or(f32::INFINITY, |(_, away)| away) } else { here[node] };
             map[NODES + node] = encode_distance(f64::from(away) / standing.radius);
         }
         map
     }
 }
 
-/// Angle from a direction to the edge that runs through its nearest place and those close to it, in radians.
-fn angle_to_edge(toward: Vec3A, nearest: Vec3A, edges: &[(Vec3A, f32)]) -> f64 {
-    let close = edges.iter().map(|(place, _)| *place - nearest).filter(|step| step.length_squared() < CLOSE * CLOSE);
-    let along = |step: Vec3A| {
-        let share = (toward - nearest).dot(step) / step.length_squared().max(f32::MIN_POSITIVE);
-        toward.dot((nearest + share.clamp(0.0, 1.0) * step).normalize())
-    };
-    // Angles below 0.02 degrees are lost in the cosine; a map's steps are 0.35 degrees.
-    f64::from(close.map(along).fold(toward.dot(nearest), f32::max).min(1.0)).acos()
+/// The place nearest to a direction.
+fn nearest_to(toward: Vec3A, places: &[(Vec3A, f32)]) -> Option<usize> {
+    let mut nearest = None;
+    let mut most = f32::NEG_INFINITY;
+    for (index, (place, _)) in places.iter().enumerate() {
+        let cosine = place.dot(toward);
+        if cosine > most {
+            most = cosine;
+            nearest = Some(index);
+        }
+    }
+    nearest
+}
+
+/// Places on the edge that runs through one of them: steps from there. Neighbouring nodes have the same.
+struct Close {
+    nearest: usize,
+    places: Vec<Vec3A>,
+}
+
+impl Close {
+    /// Angle from a direction to the edge that runs through its nearest place and those close to it, in radians.
+    fn angle_to_edge(&mut self, toward: Vec3A, nearest: usize, edges: &[(Vec3A, f32)]) -> f64 {
+        let at = edges[nearest].0;
+        if self.nearest != nearest {
+            self.nearest = nearest;
+            self.places.clear();
+            let steps = edges.iter().map(|(place, _)| *place - at);
+            self.places.extend(steps.filter(|step| step.length_squared() < CLOSE * CLOSE));
+        }
+        let along = |step: &Vec3A| {
+            let share = (toward - at).dot(*step) / step.length_squared().max(f32::MIN_POSITIVE);
+            toward.dot((at + share.clamp(0.0, 1.0) * *step).normalize())
+        };
+        // Angles below 0.02 degrees are lost in the cosine; a map's steps are 0.35 degrees.
+        f64::from(self.places.iter().map(along).fold(toward.dot(at), f32::max).min(1.0)).acos()
+    }
 }
 
 #[cfg(test)]

@@ -14,7 +14,7 @@ pub struct BakeOptions {
     /// Sample points in place of the quality's: cube:SHELLSxCELLS, with an odd number of cells. Words may follow after
     /// commas: inner=R, outer=R (in bounding radii), round (no fit to the mesh's box), edges (samples on the edges of
     /// cube faces: finer steps in as many bytes, not for boxes), edges=auto (the mesh decides). Example:
-    /// cube:18x7,edges=auto
+    /// cube:20x7,edges=auto
     #[cfg_attr(feature = "cli", arg(long, value_name = "LATTICE"))]
     pub lattice: Option<Lattice>,
     /// Edge of a captured cube face in texels, in place of the quality's
@@ -85,7 +85,7 @@ mod tests {
         let all: Vec<Options> = ["draft", "normal", "high"].map(|word| parsed(&["--quality", word])).to_vec();
         assert_eq!(all, Quality::value_variants().iter().map(|quality| quality.options()).collect::<Vec<_>>());
         assert_eq!(all[1], parsed(&[]), "normal is what there is without the option");
-        assert_eq!("cube:18x7,edges=auto".parse(), Ok(Lattice::default()), "as help texts write it");
+        assert_eq!("cube:20x7,edges=auto".parse(), Ok(Lattice::default()), "as help texts write it");
         for pair in all.windows(2) {
             let samples = pair.iter().map(|o| o.lattice.starting_at(1.0).stored_count()).collect::<Vec<_>>();
             assert!(pair[0].face_px < pair[1].face_px && pair[0].bands < pair[1].bands && samples[0] < samples[1]);

@@ -27,7 +27,7 @@ use std::sync::{Arc, OnceLock};
 use std::time::Instant;
 
 /// Counts in every name of the cache: another number where a bake of surfaces computes something else.
-const VERSION: u32 = 12;
+const VERSION: u32 = 13;
 /// How far towards the middle of its triangles a vertex is seen from, as a share of the way: the light of a crease is
 /// that just inside each face. Where meshes are left as they are, so are the places from which they are seen.
 const NUDGE: f32 = 0.02;
@@ -247,6 +247,7 @@ impl GroupPlan {
         if let Some(limits) = self.limits(&group).filter(|_| !refined.is_empty()) {
             let most = limits.vertices.max(1) as u32;
             refine(&mut refined, &limits, &|count| progress((count as u32).min(most) / 2, most));
+            eprintln!("REFINE {:?}", started.elapsed());
         }
         let mut surfaces = self.plain();
         let mut parents: Vec<Option<Vec<u32>>> = vec![None; surfaces.len()];

@@ -53,7 +53,7 @@ const LATTICES: [&str; 10] = [
     "cube:16x5",
     "cube:12x7",
     "cube:16x7",
-    "cube:20x7,edges=auto",
+    "cube:18x7,edges=auto",
     "cube:22x9,edges=auto",
     "cube:16x11",
     "cube:24x9,edges=auto",

@@ -8,17 +8,17 @@
 use crate::asset::grid::Grid;
 use crate::draw::patches::{BLOCK_CELLS, Patches};
 use crate::draw::pixel_light::{PixelLight, texels};
-use crate::draw::{DrawnEntity, DrawnViewport, EntityPush};
+use crate::draw::{DrawnEntity, DrawnViewport, EntityPush, PipelineMaker, made_once};
 use crate::error::Result;
 use crate::gpu::{Buffer, Device, Drawing, GraphicsPipeline, GraphicsState, TexelView};
 use crate::layout::UPWARDS;
-use crate::shaders::{Library, ShaderPermutation};
+use crate::shaders::ShaderPermutation;
 use crate::sharp::SharpPermutation;
 use ash::vk;
 use bytemuck::{Pod, Zeroable};
 use glam::Vec3;
 use std::ops::Range;
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 const QUADS: vk::Format = vk::Format::R32G32B32A32_UINT;
 /// How much nearer patches are drawn than the grid that they lie on, in steps of depth: 2e-6 of the distance. Rounding
@@ -103,31 +103,27 @@ struct Push {
 }
 
 pub struct DrawGrid {
-    pipeline: GraphicsPipeline,
-    /// The one whose pixels evaluate sharp lights, where the scene has any.
-    pixel: Option<GraphicsPipeline>,
+    maker: PipelineMaker,
+    /// Made where they are first drawn with; the second one's pixels evaluate sharp lights.
+    made: [OnceLock<GraphicsPipeline>; 2],
 }
 
 impl DrawGrid {
-    /// For what "draw" draws into; `display` where the picture is encoded.
-    pub fn new(
-        device: &Arc<Device>,
-        library: &Library,
-        state: GraphicsState,
-        display: bool,
-        sharp: Option<&SharpPermutation>,
-    ) -> Result<Self> {
-        let vertex = library.shader(&ShaderPermutation::new("grid.vert", 4))?;
-        let fragment = library.shader(&Self::row(display, None))?;
-        let pixel = |sharp| -> Result<GraphicsPipeline> {
-            let vertex = library.shader(&ShaderPermutation::new("grid.vert", 4).define("BLOCK_CELLS", BLOCK_CELLS))?;
-            let fragment = library.shader(&Self::row(display, Some(sharp)))?;
-            let nearer = GraphicsState { nearer_steps: NEARER_STEPS, ..state };
-            GraphicsPipeline::new(device, "draw grid pixels", &vertex, &fragment, nearer)
-        };
-        Ok(DrawGrid {
-            pipeline: GraphicsPipeline::new(device, "draw grid", &vertex, &fragment, state)?,
-            pixel: sharp.map(pixel).transpose()?,
+    pub fn new(maker: PipelineMaker) -> Self {
+        DrawGrid { maker, made: Default::default() }
+    }
+
+    fn pipeline(&self, sharp: Option<&SharpPermutation>) -> Result<&GraphicsPipeline> {
+        let PipelineMaker { state, display, .. } = self.maker;
+        let vertex = ShaderPermutation::new("grid.vert", 4);
+        let fragment = Self::row(display, sharp);
+        made_once(&self.made[usize::from(sharp.is_some())], || match sharp {
+            None => self.maker.make("draw grid", &[vertex, fragment], state),
+            Some(_) => {
+                let nearer = GraphicsState { nearer_steps: NEARER_STEPS, ..state };
+                let vertex = vertex.define("BLOCK_CELLS", BLOCK_CELLS);
+                self.maker.make("draw grid pixels", &[vertex, fragment], nearer)
+            }
         })
     }
 
@@ -145,7 +141,7 @@ impl DrawGrid {
         viewport: &DrawnViewport<'r>,
         white: f32,
     ) -> Result<()> {
-        drawing.bind(&self.pipeline, &[(&grid.positions, 0), (&grid.places, 0)], &grid.indices);
+        drawing.bind(self.pipeline(None)?, &[(&grid.positions, 0), (&grid.places, 0)], &grid.indices);
         drawing.resources(&texels(&Self::own(grid, viewport))?)?;
         Self::finish(drawing, grid, entity, white, indices);
         Ok(())
@@ -161,7 +157,8 @@ impl DrawGrid {
         light: &PixelLight<'r>,
         white: f32,
     ) -> Result<()> {
-        let Some(pipeline) = &self.pixel else { return Ok(()) };
+        let Some(sharp) = &self.maker.sharp else { return Ok(()) };
+        let pipeline = self.pipeline(Some(sharp))?;
         let [positions, places, indices] = &grid.patches;
         drawing.bind(pipeline, &[(positions, 0), (places, 0)], indices);
         drawing.resources(&light.binds(&Self::own(grid, viewport), &[])?)?;

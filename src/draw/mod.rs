@@ -23,16 +23,19 @@ use crate::draw::smooth::Smooth;
 use crate::draw::triangles::{Detail, DrawTriangles, DrawnTriangles};
 use crate::error::Result;
 use crate::gloss::DrawnReflections;
-use crate::gpu::{Access, Buffer, Commands, Device, Drawing, GraphicsState, Image, ImageShape, Keeps, Target, Texture};
+use crate::gpu::{
+    Access, Buffer, Commands, Device, Drawing, GraphicsPipeline, GraphicsState, Image, ImageShape, Keeps, Target,
+    Texture,
+};
 use crate::lists::sight::{Sight, TriangleRun};
-use crate::shaders::Library;
+use crate::shaders::{Library, ShaderPermutation};
 use crate::sharp::SharpPermutation;
 use ash::vk;
 use bytemuck::{Pod, Zeroable};
 pub use choices::{Antialias, Finish, Shading};
 use glam::{Mat4, Vec3};
 use std::ops::Range;
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 /// Linear half floats. Their 11 bits are more than a PNG shows, and they take half the bandwidth of f32.
 const COLOR: vk::Format = vk::Format::R16G16B16A16_SFLOAT;
@@ -179,17 +182,48 @@ pub struct DrawnViewport<'d> {
     pub lines: Range<u32>,
 }
 
-/// Surfaces that pictures of a scene show.
+/// How pictures evaluate sharp lights themselves.
 #[derive(Clone, Copy)]
-pub struct Surfaces<'p> {
+pub struct PictureLights<'p> {
+    /// By pixels, where they do.
+    pub pixels: Option<&'p SharpPermutation>,
+    /// For highlights, where the scene has such lights.
+    pub highlights: Option<&'p SharpPermutation>,
+}
+
+/// What pipelines are made of that draw into the same images.
+#[derive(Clone)]
+pub struct PipelineMaker {
+    device: Arc<Device>,
+    library: Library,
+    state: GraphicsState,
+    /// Whether the picture is encoded.
+    display: bool,
     /// Where pixels evaluate sharp lights: how.
-    pub sharp: Option<&'p SharpPermutation>,
-    /// Whether textures vary reflectances.
-    pub painted: bool,
-    /// Whether any is transparent.
-    pub transparent: bool,
-    /// Whether any is glossy, and how the sharp lights are evaluated of which it has highlights.
-    pub gloss: Option<Option<&'p SharpPermutation>>,
+    sharp: Option<SharpPermutation>,
+}
+
+impl PipelineMaker {
+    /// A pipeline of a vertex and a fragment shader.
+    fn make(&self, name: &str, rows: &[ShaderPermutation; 2], state: GraphicsState) -> Result<GraphicsPipeline> {
+        let [vertex, fragment] = rows;
+        let vertex = self.library.shader(vertex)?;
+        let fragment = self.library.shader(fragment)?;
+        GraphicsPipeline::new(&self.device, name, &vertex, &fragment, state)
+    }
+}
+
+/// The pipeline that was made before, or is made now: a scene needs few of all that there are, and one may take half a
+/// second to compile.
+fn made_once(
+    made: &OnceLock<GraphicsPipeline>,
+    make: impl FnOnce() -> Result<GraphicsPipeline>,
+) -> Result<&GraphicsPipeline> {
+    if made.get().is_none() {
+        let pipeline = make()?;
+        return Ok(made.get_or_init(|| pipeline));
+    }
+    Ok(made.get().expect("it was made"))
 }
 
 /// The pipelines and their images.
@@ -215,7 +249,7 @@ impl Draw {
         [width, height]: [u32; 2],
         antialias: Antialias,
         finish: Finish,
-        surfaces: &Surfaces<'_>,
+        lights: PictureLights<'_>,
     ) -> Result<Self> {
         let samples = antialias.samples(device);
         let color = if finish == Finish::Display { SHOWN } else { COLOR };
@@ -229,9 +263,16 @@ impl Draw {
             nearer_steps: 0.0,
         };
         let display = finish == Finish::Display;
+        let maker = PipelineMaker {
+            device: device.clone(),
+            library: library.clone(),
+            state,
+            display,
+            sharp: lights.pixels.copied(),
+        };
         Ok(Draw {
-            triangles: DrawTriangles::new(device, library, state, display, surfaces)?,
-            grid: DrawGrid::new(device, library, state, display, surfaces.sharp)?,
+            triangles: DrawTriangles::new(maker.clone(), lights.highlights.copied()),
+            grid: DrawGrid::new(maker),
             samples: (samples > 1)
                 .then(|| Image::new(device, "draw samples", ImageShape { samples, ..shape }))
                 .transpose()?,

@@ -5,18 +5,18 @@
 
 use crate::asset::mesh::Mesh;
 use crate::draw::pixel_light::{PixelLight, texels};
-use crate::draw::{DrawnEntity, DrawnPaint, DrawnViewport, EntityPush, Surfaces};
+use crate::draw::{DrawnEntity, DrawnPaint, DrawnViewport, EntityPush, PipelineMaker, made_once};
 use crate::error::Result;
 use crate::gloss::{self, DrawnReflections};
 use crate::gpu::{Bind, Buffer, Device, Drawing, GraphicsPipeline, GraphicsState, Keeps, TexelView};
 use crate::lists::sight::TriangleRun;
-use crate::shaders::{Library, ShaderPermutation};
+use crate::shaders::ShaderPermutation;
 use crate::sharp::SharpPermutation;
 use ash::vk;
 use bytemuck::{Pod, Zeroable};
 use glam::{Vec2, Vec3};
 use std::ops::Range;
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 /// Triangles in a run. They are few enough that most runs lie on one side of an object, and many enough that a draw
 /// call costs little beside them.
@@ -149,6 +149,16 @@ pub enum Detail {
 }
 
 impl Look<'_> {
+    const COUNT: usize = 5;
+
+    fn number(self) -> usize {
+        match self {
+            Look::Plain => 0,
+            Look::Painted => 1,
+            Look::Glossy { detail, .. } => 2 + detail as usize,
+        }
+    }
+
     /// The macros of both stages; `first` is the first binding of reflections.
     fn macros(self, row: ShaderPermutation, first: u32) -> ShaderPermutation {
         let row = row.define("PAINTED", !matches!(self, Look::Plain));
@@ -165,91 +175,74 @@ impl Look<'_> {
 /// Bindings of reflections in the shaders that show the light of vertices, and in those whose pixels evaluate lights.
 const GLOSS_BINDINGS: [u32; 2] = [2, 13];
 
-/// Pipelines of surfaces of one look.
-struct Pipelines {
-    /// Draws both sides of triangles.
-    open: GraphicsPipeline,
-    /// Culls back faces.
-    solid: GraphicsPipeline,
-    /// The one whose pixels evaluate sharp lights, where the scene has any.
-    pixel: Option<GraphicsPipeline>,
-    /// As the first two, over what lies behind, where the scene has transparent surfaces.
-    over: Option<[GraphicsPipeline; 2]>,
+/// How the triangles of a surface become pixels.
+#[derive(Clone, Copy)]
+enum Form {
+    /// Both sides of triangles, or the fronts alone.
+    Vertices { culls: bool },
+    /// The same over what lies behind.
+    Over { culls: bool },
+    /// Pixels evaluate sharp lights.
+    Pixels,
+}
+
+impl Form {
+    const COUNT: usize = 5;
+
+    fn number(self) -> usize {
+        match self {
+            Form::Vertices { culls } => usize::from(culls),
+            Form::Over { culls } => 2 + usize::from(culls),
+            Form::Pixels => 4,
+        }
+    }
 }
 
 pub struct DrawTriangles {
-    plain: Pipelines,
-    /// Where the scene has textures.
-    painted: Option<Pipelines>,
-    /// Where it has glossy surfaces: of each [`Detail`].
-    glossy: Option<[Pipelines; 3]>,
-    /// Whether these have highlights.
-    highlights: bool,
+    maker: PipelineMaker,
+    /// How the sharp lights are evaluated that glossy surfaces have highlights of.
+    highlights: Option<SharpPermutation>,
+    /// By look and form; each is made where it is first drawn with.
+    made: [[OnceLock<GraphicsPipeline>; Form::COUNT]; Look::COUNT],
 }
 
 impl DrawTriangles {
-    /// For what "draw" draws into; `display` where the picture is encoded.
-    pub fn new(
-        device: &Arc<Device>,
-        library: &Library,
-        state: GraphicsState,
-        display: bool,
-        surfaces: &Surfaces<'_>,
-    ) -> Result<Self> {
-        let pipelines = |look: Look<'_>| -> Result<Pipelines> {
-            let [vertex, fragment] = Self::rows(display, look, false);
-            let vertex = library.shader(&vertex)?;
-            let fragment = library.shader(&fragment)?;
-            let solid = GraphicsState { cull: vk::CullModeFlags::BACK, ..state };
-            let over = || -> Result<[GraphicsPipeline; 2]> {
-                let [_, fragment] = Self::rows(display, look, true);
-                let fragment = library.shader(&fragment)?;
-                let of = |name, state| {
-                    let over = GraphicsState { keeps: Keeps::ColorOver, ..state };
-                    GraphicsPipeline::new(device, name, &vertex, &fragment, over)
-                };
-                Ok([of("draw over", state)?, of("draw solid over", solid)?])
-            };
-            let pixel = |sharp: &SharpPermutation| -> Result<GraphicsPipeline> {
-                let [vertex, fragment] = Self::patch_rows(display, look, sharp);
-                let nearer = GraphicsState { nearer_steps: NEARER_STEPS, ..state };
-                let vertex = library.shader(&vertex)?;
-                let fragment = library.shader(&fragment)?;
-                GraphicsPipeline::new(device, "draw triangle pixels", &vertex, &fragment, nearer)
-            };
-            Ok(Pipelines {
-                open: GraphicsPipeline::new(device, "draw", &vertex, &fragment, state)?,
-                solid: GraphicsPipeline::new(device, "draw solid", &vertex, &fragment, solid)?,
-                pixel: surfaces.sharp.map(pixel).transpose()?,
-                over: surfaces.transparent.then(over).transpose()?,
-            })
-        };
-        let glossy = |highlights| -> Result<[Pipelines; 3]> {
-            let of = |detail| pipelines(Look::Glossy { highlights, detail });
-            Ok([of(Detail::Rough)?, of(Detail::Mirror)?, of(Detail::Textured)?])
-        };
-        Ok(DrawTriangles {
-            plain: pipelines(Look::Plain)?,
-            painted: surfaces.painted.then(|| pipelines(Look::Painted)).transpose()?,
-            glossy: surfaces.gloss.map(glossy).transpose()?,
-            highlights: surfaces.gloss.flatten().is_some(),
+    pub fn new(maker: PipelineMaker, highlights: Option<SharpPermutation>) -> Self {
+        DrawTriangles { maker, highlights, made: Default::default() }
+    }
+
+    fn pipeline(&self, look: Look<'_>, form: Form) -> Result<&GraphicsPipeline> {
+        let PipelineMaker { state, display, sharp, .. } = &self.maker;
+        made_once(&self.made[look.number()][form.number()], || match form {
+            Form::Vertices { culls } | Form::Over { culls } => {
+                let is_over = matches!(form, Form::Over { .. });
+                let cull = if culls { vk::CullModeFlags::BACK } else { vk::CullModeFlags::NONE };
+                let keeps = if is_over { Keeps::ColorOver } else { state.keeps };
+                let state = GraphicsState { cull, keeps, ..*state };
+                self.maker.make("draw", &Self::rows(*display, look, is_over), state)
+            }
+            Form::Pixels => {
+                let sharp = sharp.as_ref().expect("pixels evaluate lights where a scene has sharp ones");
+                let nearer = GraphicsState { nearer_steps: NEARER_STEPS, ..*state };
+                self.maker.make("draw triangle pixels", &Self::patch_rows(*display, look, sharp), nearer)
+            }
         })
     }
 
-    /// The pipelines that draw an entity, its paint, and what it reflects.
-    fn pipelines<'d>(
+    /// How an entity looks, its paint, and what it reflects.
+    fn look<'d>(
         &self,
         entity: &DrawnEntity<'d>,
         viewport: &DrawnViewport<'d>,
-    ) -> (&Pipelines, Option<DrawnPaint<'d>>, Option<DrawnReflections<'d>>) {
-        let gloss = viewport.gloss.zip(entity.gloss.as_ref());
-        match (&self.glossy, gloss, &self.painted, entity.paint) {
-            (Some(glossy), Some((gloss, drawn)), ..) => {
+    ) -> (Look<'_>, Option<DrawnPaint<'d>>, Option<DrawnReflections<'d>>) {
+        match (viewport.gloss.zip(entity.gloss.as_ref()), entity.paint) {
+            (Some((gloss, drawn)), paint) => {
                 let white = DrawnPaint { texture: &gloss.reflections.white, tint: Vec3::ONE, alpha_cutoff: 0.0 };
-                (&glossy[drawn.detail as usize], Some(entity.paint.unwrap_or(white)), Some(gloss))
+                let look = Look::Glossy { highlights: self.highlights.as_ref(), detail: drawn.detail };
+                (look, Some(paint.unwrap_or(white)), Some(gloss))
             }
-            (.., Some(painted), Some(paint)) => (painted, Some(paint), None),
-            _ => (&self.plain, None, None),
+            (None, Some(paint)) => (Look::Painted, Some(paint), None),
+            (None, None) => (Look::Plain, None, None),
         }
     }
 
@@ -292,13 +285,11 @@ impl DrawTriangles {
     ) -> Result<()> {
         let mut vertices =
             vec![(&mesh.positions, 0), (&mesh.emission, 0), (viewport.radiosity, entity.radiosity_offset)];
-        let (pipelines, paint, gloss) = self.pipelines(entity, viewport);
+        let (look, paint, gloss) = self.look(entity, viewport);
         vertices.extend(mesh.paint.iter().filter(|_| paint.is_some()).map(|paint| (paint, 0)));
-        let pipeline = match &pipelines.over {
-            Some(over) if entity.transparent => &over[usize::from(entity.culls)],
-            _ if entity.culls => &pipelines.solid,
-            _ => &pipelines.open,
-        };
+        let culls = entity.culls;
+        let form = if entity.transparent { Form::Over { culls } } else { Form::Vertices { culls } };
+        let pipeline = self.pipeline(look, form)?;
         drawing.bind(pipeline, &vertices, &mesh.indices);
         let push = EntityPush::new(entity, white);
         match paint {
@@ -309,7 +300,7 @@ impl DrawTriangles {
                     binds.extend(texels(&[(gloss.vertices, vk::Format::R32G32B32A32_SFLOAT)])?);
                     binds.extend(gloss.binds()?);
                     binds.extend(Self::maps(entity, gloss));
-                    if self.highlights {
+                    if self.highlights.is_some() {
                         binds.extend(texels(&[(gloss.lights, vk::Format::R32G32B32A32_SFLOAT)])?);
                     }
                 }
@@ -336,8 +327,9 @@ impl DrawTriangles {
         light: &PixelLight<'r>,
         white: f32,
     ) -> Result<()> {
-        let (pipelines, paint, gloss) = self.pipelines(entity, viewport);
-        let (Some(pipeline), Some(by_pixel)) = (&pipelines.pixel, entity.by_pixel) else { return Ok(()) };
+        let Some(by_pixel) = entity.by_pixel.filter(|_| self.maker.sharp.is_some()) else { return Ok(()) };
+        let (look, paint, gloss) = self.look(entity, viewport);
+        let pipeline = self.pipeline(look, Form::Pixels)?;
         drawing.bind(pipeline, &[], &mesh.indices);
         let mut binds = light.binds(
             &[(&mesh.indices, vk::Format::R32_UINT), (viewport.radiosity, vk::Format::R32G32B32A32_SFLOAT)],

@@ -62,10 +62,10 @@ pub struct Lattice {
 }
 
 impl Default for Lattice {
-    /// 18 shells to 8 r in equal steps of sin(half-angle / 2), 6 x 7 x 7 cells of directions, and b / (1 - c) is
+    /// 20 shells to 8 r in equal steps of sin(half-angle / 2), 6 x 7 x 7 cells of directions, and b / (1 - c) is
     /// interpolated. The object's shape decides the fit, the first shell, and whether samples lie on the faces' edges.
     fn default() -> Self {
-        Lattice { shells: 18, inner: AUTOMATIC, outer: 8.0, cells: 7, fit: None, edges: None }
+        Lattice { shells: 20, inner: AUTOMATIC, outer: 8.0, cells: 7, fit: None, edges: None }
     }
 }
 

@@ -28,7 +28,7 @@ use crate::bake::ensure::SceneProgress;
 use crate::bake::surfaces::SurfacePlan;
 use crate::bake::{self, Baker, SceneNeeds};
 use crate::bounce::{Bounce, Bounces, Linked, LinkedEntity};
-use crate::draw::{Shading, Surfaces};
+use crate::draw::{PictureLights, Shading};
 use crate::error::Result;
 use crate::gloss::Reflections;
 use crate::gpu::{Buffer, Commands, Device, Timing};
@@ -176,12 +176,7 @@ impl Frame {
         let sharp =
             sharp.map(|fitting| Sharp::new(device, library, SharpPermutation { edges, ..fitting })).transpose()?;
         let highlights = sharp.as_ref().map(|sharp| sharp.permutation);
-        let surfaces = Surfaces {
-            sharp: pixels.pixels(),
-            painted: !buffers.textures.is_empty(),
-            transparent: scene.entities.iter().any(|entity| entity.transparent),
-            gloss: reflections.is_some().then_some(highlights.as_ref()),
-        };
+        let lights = PictureLights { pixels: pixels.pixels(), highlights: highlights.as_ref() };
         let entity_room = entity_count.max(merge.permutation.entity_limit as usize);
         let mut sky = SkyLight::new(device, options.bake.bands)?;
         sky.write(&scene, options.bake.bands)?;
@@ -198,7 +193,7 @@ impl Frame {
             work: ClusterWork::new(device, lists, entity_room)?,
             sky,
             radiosity,
-            picture: FramePicture::new(device, library, &options, &surfaces)?,
+            picture: FramePicture::new(device, library, &options, lights)?,
             reflections,
             pixels,
             chains: None,

@@ -9,7 +9,7 @@ use crate::asset::edges::Edges;
 use crate::asset::picture::linear_from_srgb;
 use crate::draw::pixel_light::PixelLight;
 use crate::draw::smooth::Lines;
-use crate::draw::{Antialias, Draw, DrawnViewport, Finish, Surfaces};
+use crate::draw::{Antialias, Draw, DrawnViewport, Finish, PictureLights};
 use crate::error::Result;
 use crate::gpu::{Buffer, BufferKind, Device, Image, Timing};
 use crate::scene::Placement;
@@ -33,9 +33,9 @@ pub(super) struct FramePicture {
 
 impl FramePicture {
     /// Makes linear pictures of the size in `options`.
-    pub fn new(device: &Arc<Device>, library: &Library, options: &Options, surfaces: &Surfaces<'_>) -> Result<Self> {
+    pub fn new(device: &Arc<Device>, library: &Library, options: &Options, lights: PictureLights<'_>) -> Result<Self> {
         Ok(FramePicture {
-            draw: draw(device, library, options, Finish::Linear, surfaces)?,
+            draw: draw(device, library, options, Finish::Linear, lights)?,
             readback: readback(device, options.size)?,
             lines: Lines::new(device)?,
             prepared: Vec::new(),
@@ -63,9 +63,9 @@ fn draw(
     library: &Library,
     options: &Options,
     finish: Finish,
-    surfaces: &Surfaces<'_>,
+    lights: PictureLights<'_>,
 ) -> Result<Draw> {
-    Draw::new(device, library, options.size, options.antialias, finish, surfaces)
+    Draw::new(device, library, options.size, options.antialias, finish, lights)
 }
 
 /// Room for a picture of either finish.
@@ -111,13 +111,8 @@ impl Frame {
     pub(super) fn set_pictures(&mut self, options: Options, finish: Finish) -> Result<Draw> {
         let sharp = self.sharp.as_ref().map(|sharp| sharp.permutation);
         let pixels = PixelShading::new(&self.device, &options, &self.buffers, self.radiosity.soft(), sharp);
-        let surfaces = Surfaces {
-            sharp: pixels.pixels(),
-            painted: !self.buffers.textures.is_empty(),
-            transparent: self.scene.entities.iter().any(|entity| entity.transparent),
-            gloss: self.reflections.is_some().then_some(sharp.as_ref()),
-        };
-        let draw = draw(&self.device, &self.library, &options, finish, &surfaces)?;
+        let lights = PictureLights { pixels: pixels.pixels(), highlights: sharp.as_ref() };
+        let draw = draw(&self.device, &self.library, &options, finish, lights)?;
         self.options = options;
         self.pixels = pixels;
         Ok(std::mem::replace(&mut self.picture.draw, draw))

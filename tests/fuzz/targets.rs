@@ -209,7 +209,7 @@ fn decode(bytes: &[u8]) -> Result<()> {
 
 fn lattices() -> Vec<Vec<u8>> {
     [
-        "cube:18x7",
+        "cube:20x7",
         "cube:8x5,inner=0.9,outer=5,edges",
         "cube:2x3,round",
         "cube:3x3,centre=0:1:0,stretch=1:1:2,edges=auto",

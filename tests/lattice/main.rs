@@ -64,7 +64,7 @@ fn default_counts() {
     // around.
     for (edges, side) in [(Some(true), 9), (Some(false), 7)] {
         let lattice = Lattice { edges, ..Lattice::default() };
-        assert_eq!((lattice.sample_count(), lattice.stored_count()), (18 * 6 * side * side, 18 * 6 * 9 * 9));
+        assert_eq!((lattice.sample_count(), lattice.stored_count()), (20 * 6 * side * side, 20 * 6 * 9 * 9));
         assert_eq!(lattice.sources().len() as u32, lattice.stored_direction_count());
     }
 }
@@ -254,7 +254,7 @@ fn text_form_round_trips() {
         let back: Lattice = text.parse().unwrap_or_else(|error| panic!("{text}: {error}"));
         assert_eq!(back, lattice, "{text}");
     }
-    let short: Lattice = "cube:18x7,edges=auto".parse().unwrap();
+    let short: Lattice = "cube:20x7,edges=auto".parse().unwrap();
     assert_eq!(short, Lattice::default(), "the documented default");
     assert_eq!(short.starting_at(OUTSIDE_INNER).inner, OUTSIDE_INNER);
     assert_eq!(short.starting_at(0.5).starting_at(0.7).inner, 0.5, "chosen once");

@@ -20,6 +20,7 @@ use crate::scene::Placement;
 use crate::shaders::{Library, ShaderPermutation};
 use ash::vk;
 use glam::DVec3;
+use std::f64::consts::PI;
 use std::sync::Arc;
 
 /// How often light bounces.
@@ -286,6 +287,65 @@ impl Bounce {
         ];
         resources.extend(light.soft.map(Bind::Buffer));
         commands.dispatch(pipeline, &resources, &counts[1], [counts[0] * CLUSTER_VERTICES, 1, 1])
+    }
+}
+
+/// What the passes read of the scene and of light.
+pub struct TwinInput<'t> {
+    /// Direct light of every place of the buffers of light.
+    pub direct: &'t [DVec3],
+    /// Albedo of every entity, over pi.
+    pub albedo: &'t [DVec3],
+    /// Place and normal in the world of a vertex of an entity that moves: entity, vertex of the vertex buffer.
+    pub vertex: &'t dyn Fn(usize, usize) -> [DVec3; 2],
+}
+
+impl Bounce {
+    /// The CPU twin of the passes, in f64, from the same links: light of every place after so many steps.
+    pub fn twin(&self, input: &TwinInput<'_>, steps: u32) -> Result<Vec<DVec3>> {
+        let [run_count, vertex_count] = self.counts.map(|count| count as usize);
+        let runs: Vec<[u32; 2]> = self.runs.download(run_count)?;
+        let areas: Vec<f32> = self.areas.download(vertex_count)?;
+        let ranges: Vec<[u32; 2]> = self.ranges.download(vertex_count)?;
+        let links: Vec<u32> = self.links.download((self.links.size_bytes / 4) as usize)?;
+        let mut light = input.direct.to_vec();
+        let mut of_runs = Vec::new();
+        for _ in 0..steps {
+            let mean = |[first, count]: &[u32; 2]| {
+                let places = *first as usize..(first + count) as usize;
+                let whole: f64 = areas[places.clone()].iter().map(|area| f64::from(*area)).sum();
+                places.map(|v| f64::from(areas[v]) * light[v]).sum::<DVec3>() / whole.max(1e-30)
+            };
+            of_runs = runs.iter().map(mean).collect::<Vec<DVec3>>();
+            let bounced = |(place, [first, packed]): (usize, &[u32; 2])| {
+                let own = &links[*first as usize..][..(packed & 255) as usize];
+                let along = |link: &u32| f64::from(link >> RUN_BITS) * of_runs[(link & ((1 << RUN_BITS) - 1)) as usize];
+                let sum = own.iter().map(along).sum::<DVec3>() / f64::from(WHOLE_SHARE);
+                input.direct[place] + PI * input.albedo[(packed >> 8) as usize] * sum
+            };
+            light = ranges.iter().enumerate().map(bounced).collect();
+        }
+        let Some(Moved { groups, far, counts, .. }) = &self.moved else { return Ok(light) };
+        let groups: Vec<[u32; 4]> = groups.download(counts[0] as usize)?;
+        let far: Vec<[[f32; 4]; 2]> = far.download(counts[1] as usize)?;
+        for [entity, vertex_first, first, count] in groups.into_iter().map(|group| group.map(|x| x as usize)) {
+            for v in 0..count {
+                let [place, normal] = (input.vertex)(entity, vertex_first + v);
+                let mut sum = DVec3::ZERO;
+                let mut whole = 0.0;
+                for [[x, y, z, number], [a, b, c, _]] in &far {
+                    let to = DVec3::new((*x).into(), (*y).into(), (*z).into()) - place;
+                    let area = DVec3::new((*a).into(), (*b).into(), (*c).into());
+                    let square = to.length_squared();
+                    let faced = normal.dot(to).max(0.0) * (-area.dot(to)).max(0.0);
+                    let share = faced / (square * (PI * square + area.length())).max(1e-30);
+                    sum += share * of_runs[number.to_bits() as usize];
+                    whole += share;
+                }
+                light[first + v] += PI * input.albedo[entity] * sum / whole.max(1.0);
+            }
+        }
+        Ok(light)
     }
 }
 

@@ -4,6 +4,7 @@
 //! read but the embedded scenes and shaders (or those that replace them), and fields are baked anew.
 
 pub mod assemble;
+pub mod bounce;
 pub mod capture;
 pub mod draw;
 pub mod gloss;
@@ -55,13 +56,14 @@ impl CheckRow {
 type PassCheck = fn(&Baker, &mut dyn FnMut(CheckRow)) -> Result<()>;
 
 /// Every pass in the order of execution, by the one word that names it everywhere.
-pub const PASSES: [(&str, PassCheck); 10] = [
+pub const PASSES: [(&str, PassCheck); 11] = [
     ("capture", capture::rows),
     ("project", project::rows),
     ("assemble", assemble::rows),
     ("silhouette", silhouette::rows),
     ("merge", merge::rows),
     ("sharp", sharp::rows),
+    ("bounce", bounce::rows),
     ("gloss", gloss::rows),
     ("draw", draw::rows),
     ("smooth", smooth::rows),

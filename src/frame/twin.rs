@@ -1,8 +1,10 @@
 //! The CPU twin of a frame's merge, and what its lists leave off.
 
 use super::Frame;
+use crate::bounce::TwinInput;
 use crate::error::Result;
 use crate::field::{Area, ShadowField};
+use crate::gpu::Buffer;
 use crate::layout::{CLUSTER_VERTICES, ENTRY_ENTITIES, ListEntry};
 use crate::lists::gather::{self, Candidates, Counts};
 use crate::lists::incremental::{ClusterLists, State};
@@ -226,6 +228,30 @@ impl FrameTwin<'_> {
         for (to, from) in lit.iter_mut().zip(twin.run(&points)) {
             *to = (DVec3::from_array(*to) + albedo * from).to_array();
         }
+    }
+}
+
+impl Frame {
+    /// The light of all vertices after bounces, as they are stored, and what the twin finds from the same direct light;
+    /// `None` where light does not bounce.
+    pub fn bounced_beside_twin(&self, placements: &[Placement]) -> Result<Option<[Vec<DVec3>; 2]>> {
+        let Some(bounce) = &self.bounce else { return Ok(None) };
+        let vector = |[x, y, z, _]: [f32; 4]| DVec3::new(x.into(), y.into(), z.into());
+        let light = |buffer: &Buffer| -> Result<Vec<DVec3>> {
+            Ok(buffer.download((buffer.size_bytes / 16) as usize)?.into_iter().map(vector).collect())
+        };
+        let vertices: Vec<[f32; 4]> =
+            self.buffers.vertices.download((self.buffers.vertices.size_bytes / 16) as usize)?;
+        let vertex = |entity: usize, v: usize| {
+            let placement = &placements[entity];
+            let place = placement.turn() * (vector(vertices[2 * v]) * f64::from(placement.scale));
+            [self.centre(entity, placement) + place, placement.turn() * vector(vertices[2 * v + 1])]
+        };
+        let albedo: Vec<DVec3> = self.scene.entities.iter().map(|entity| entity.albedo.as_dvec3() / PI).collect();
+        let direct = light(self.radiosity.direct())?;
+        let input = TwinInput { direct: &direct, albedo: &albedo, vertex: &vertex };
+        let wanted = bounce.twin(&input, self.options.bounces.steps())?;
+        Ok(Some([light(&self.radiosity.merged)?, wanted]))
     }
 }
 

@@ -95,14 +95,13 @@ fn what_a_dropped_file_loses_is_said() {
     let mut model = Model::default();
     let mesh = model.cuboid([-0.5; 3], [0.5; 3], None);
     model.node(serde_json::json!({ "name": "box", "mesh": mesh }));
-    model.json["materials"] = serde_json::json!([{ "alphaMode": "BLEND" }]);
-    model.json["meshes"][0]["primitives"][0]["material"] = 0.into();
+    model.push("scenes", serde_json::json!({ "nodes": [0] }));
     let folder = tempfile::tempdir().unwrap();
-    let path = model.write(folder.path(), "glass");
+    let path = model.write(folder.path(), "scenes");
     let Some(mut stand) = Stand::new("lost") else { return };
     stand.viewer.open(&path).unwrap();
     let lines = stand.viewer.messages();
-    assert!(lines.iter().any(|line| line.contains("glass") && line.contains("transparen")), "{lines:?}");
+    assert!(lines.iter().any(|line| line.contains("scenes") && line.contains("transparen")), "{lines:?}");
     drop(stand);
     let Some(mut stand) = Stand::with("strict", |setup| setup.strict = true) else { return };
     stand.viewer.open(&path).unwrap();

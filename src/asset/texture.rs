@@ -28,7 +28,7 @@ impl Wrap {
     /// The texel of a row of `count` that a coordinate falls into.
     fn texel(self, at: f32, count: usize) -> usize {
         let within = match self {
-            Wrap::Repeat => at.rem_euclid(1.0),
+            Wrap::Repeat => at - at.floor(),
             Wrap::Clamp => at.clamp(0.0, 1.0),
             Wrap::Mirror => 1.0 - (at.rem_euclid(2.0) - 1.0).abs(),
         };
@@ -108,6 +108,11 @@ impl Texels {
     /// The linear colour and alpha at texture coordinates, v upwards.
     pub fn at(&self, uv: Vec2, wrap: [Wrap; 2]) -> Vec4 {
         self.linear(wrap[0].texel(uv.x, self.width), wrap[1].texel(1.0 - uv.y, self.height))
+    }
+
+    fn alpha_at(&self, uv: Vec2, wrap: [Wrap; 2]) -> f32 {
+        let [x, y] = [wrap[0].texel(uv.x, self.width), wrap[1].texel(1.0 - uv.y, self.height)];
+        f32::from(self.rgba[y * self.width + x][3]) / 255.0
     }
 
     /// What is stored at texture coordinates, 0 to 1: of a picture that holds no colours.
@@ -201,7 +206,7 @@ impl Texture {
         let varies = self.alpha_blend || self.alpha_cutoff.is_some();
         let Some((texels, uvs)) = self.texels.as_ref().zip(mesh.uvs.as_ref()).filter(|_| varies) else { return 1.0 };
         let uv: Vec2 = corners.iter().zip(weights).map(|(&v, weight)| weight * uvs[v as usize]).sum();
-        let alpha = texels.at(uv, self.wrap).w;
+        let alpha = texels.alpha_at(uv, self.wrap);
         self.alpha_cutoff.map_or(alpha, |cutoff| if alpha < cutoff { 0.0 } else { 1.0 })
     }
 

@@ -14,8 +14,6 @@ use std::time::Duration;
 
 /// Rays of a packet.
 const LANES: usize = 16;
-/// Holes that a ray passes at most.
-const MOST_HOLES: usize = 32;
 /// How far beyond its sides a triangle reaches, as a share of them: no ray slips between two neighbours.
 const SLACK: f32 = 1e-5;
 
@@ -77,8 +75,6 @@ pub struct BlockerHit {
 struct Packet {
     direction: [[f32; LANES]; 3],
     inverse: [[f32; LANES]; 3],
-    /// Nothing up to this distance counts.
-    from: [f32; LANES],
     distance: [f32; LANES],
     triangle: [u32; LANES],
     middle: Vec3A,
@@ -91,7 +87,6 @@ impl Packet {
         let mut packet = Packet {
             direction: [[0.0; LANES]; 3],
             inverse: [[0.0; LANES]; 3],
-            from: [0.0; LANES],
             distance: [f32::INFINITY; LANES],
             triangle: [u32::MAX; LANES],
             middle: Vec3A::ZERO,
@@ -150,7 +145,6 @@ impl Packet {
         let most = simd.splat_f32s(1.0 + SLACK);
         let along_rays =
             [vectors::<S>(&self.direction[0]), vectors::<S>(&self.direction[1]), vectors::<S>(&self.direction[2])];
-        let from = vectors::<S>(&self.from);
         let (distances, _) = S::as_mut_simd_f32s(&mut self.distance);
         let (triangles, _) = S::as_mut_simd_u32s(&mut self.triangle);
         for i in 0..distances.len() {
@@ -163,8 +157,10 @@ impl Packet {
                 simd.and_m32s(simd.greater_than_or_equal_f32s(u, least), simd.greater_than_or_equal_f32s(v, least)),
                 simd.less_than_or_equal_f32s(simd.add_f32s(u, v), most),
             );
-            let nearer =
-                simd.and_m32s(simd.greater_than_f32s(distance, from[i]), simd.less_than_f32s(distance, distances[i]));
+            let nearer = simd.and_m32s(
+                simd.greater_than_f32s(distance, simd.splat_f32s(0.0)),
+                simd.less_than_f32s(distance, distances[i]),
+            );
             let meets = simd.and_m32s(within, nearer);
             distances[i] = simd.select_f32s(meets, distance, distances[i]);
             triangles[i] = simd.select_u32s(meets, simd.splat_u32s(index), triangles[i]);
@@ -206,12 +202,6 @@ impl WithSimd for Cast<'_> {
         for rays in directions.chunks(LANES) {
             let mut packet = Packet::new(turn, rays);
             blockers.traverse(simd, origin, &mut packet, counts, &mut open);
-            for _ in 0..MOST_HOLES {
-                if !blockers.passes_holes(origin, &mut packet, rays.len()) {
-                    break;
-                }
-                blockers.traverse(simd, origin, &mut packet, counts, &mut open);
-            }
             for lane in 0..rays.len() {
                 hits.push(blockers.hit(&packet, lane));
             }
@@ -244,24 +234,23 @@ impl Blockers {
         }
     }
 
-    /// Lets the rays that met a hole go on behind it. Returns whether there are any.
-    fn passes_holes(&self, origin: Vec3A, packet: &mut Packet, count: usize) -> bool {
-        if self.masks.is_empty() {
-            return false;
-        }
-        let mut passes = false;
-        for lane in 0..count {
-            let Some(hit) = self.hit(packet, lane) else { continue };
-            let Some(mask) = &self.masks[hit.member as usize] else { continue };
-            let (triangle, weights) = self.place(origin, packet.toward(lane), &hit);
-            if mask.is_hole(triangle, weights) {
-                packet.from[lane] = hit.distance * (1.0 + 1e-5);
-                packet.distance[lane] = f32::INFINITY;
-                packet.triangle[lane] = u32::MAX;
-                passes = true;
+    /// A triangle that has holes, for rays that meet it elsewhere.
+    #[inline(always)]
+    fn meet_masked<S: Simd>(&self, simd: S, origin: Vec3A, packet: &mut Packet, mask: &Mask, index: u32) {
+        let distances = packet.distance;
+        let triangles = packet.triangle;
+        packet.meet(simd, origin, &self.triangles[index as usize], index);
+        for lane in 0..LANES {
+            if packet.triangle[lane] != index {
+                continue;
+            }
+            let Corners { corner, edges, .. } = self.triangles[index as usize];
+            let place = origin + packet.distance[lane] * packet.toward(lane) - corner;
+            if mask.is_hole(self.numbers[index as usize], weights(edges, place)) {
+                packet.distance[lane] = distances[lane];
+                packet.triangle[lane] = triangles[lane];
             }
         }
-        passes
     }
 
     /// The first triangle on each ray of those whose members count. `turn` brings the directions into the triangles' frame.
@@ -291,8 +280,13 @@ impl Blockers {
             }
             if node.prim_count > 0 {
                 for triangle in node.first_index..node.first_index + node.prim_count {
-                    if counts[self.members[triangle as usize] as usize] {
-                        packet.meet(simd, origin, &self.triangles[triangle as usize], triangle);
+                    let member = self.members[triangle as usize] as usize;
+                    if !counts[member] {
+                        continue;
+                    }
+                    match self.masks.get(member) {
+                        Some(Some(mask)) => self.meet_masked(simd, origin, packet, mask, triangle),
+                        _ => packet.meet(simd, origin, &self.triangles[triangle as usize], triangle),
                     }
                 }
                 continue;

@@ -108,7 +108,6 @@ impl Refined {
             let difference = if buried { 0.0 } else { squares.sum::<f32>().sqrt() / COSINE_LENGTH };
             ((a, b), (transfer, difference))
         };
-        eprintln!("LOOK {} edges of {} vertices", edges.len(), self.positions.len());
         let found: Vec<_> = edges.par_iter().map(middle).collect();
         self.middles.extend(found);
     }

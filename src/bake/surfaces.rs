@@ -247,7 +247,6 @@ impl GroupPlan {
         if let Some(limits) = self.limits(&group).filter(|_| !refined.is_empty()) {
             let most = limits.vertices.max(1) as u32;
             refine(&mut refined, &limits, &|count| progress((count as u32).min(most) / 2, most));
-            eprintln!("REFINE {:?}", started.elapsed());
         }
         let mut surfaces = self.plain();
         let mut parents: Vec<Option<Vec<u32>>> = vec![None; surfaces.len()];

@@ -1,9 +1,9 @@
 //! Updates the viewer after a change: at once, after a background bake, or by a rebuild.
 
 use super::command::Changed;
-use super::preview::preview;
+use super::preview;
 use super::task::{BackgroundTask, TaskWorker};
-use super::viewer::Viewer;
+use super::viewer::{Previewed, Viewer};
 use crate::bake::{self, Baker, SceneNeeds};
 use crate::draw::show::Show;
 use crate::error::Result;
@@ -27,7 +27,7 @@ impl Viewer {
             self.settle()?;
             self.frame = None;
             self.preview = None;
-            self.previewed = false;
+            self.previewed = Previewed::Nothing;
             self.reference = None;
             self.error_shown = None;
             self.rays = None;
@@ -87,6 +87,8 @@ impl Viewer {
         }
         let options = self.setup.options.clone();
         let library = self.setup.library.clone();
+        let still = preview::still(&scene, &self.editor.placements());
+        let coarse = SceneNeeds::of(&still, &preview::coarse(self.setup.frame.bake), self.setup.frame.lights);
         self.bake = Some(BackgroundTask::new(move |worker: &TaskWorker<()>| {
             let missing = needs.missing(&scene, &cache);
             let all: u32 = missing.iter().map(|(_, captures)| captures).sum();
@@ -94,27 +96,35 @@ impl Viewer {
             let device = Device::new(&options)?;
             let baker = Baker::new(&device, &library);
             limits::check(&device, &scene, &needs)?;
-            bake::ensure(&baker, &cache, &scene, &needs, &|what, now, of| {
+            let told = |what: &str, now: u32, of: u32| {
                 let Some(place) = missing.iter().position(|(name, _)| name == what) else { return };
                 let before: u32 = missing[..place].iter().map(|(_, captures)| captures).sum();
                 let share = f64::from(now) / f64::from(of.max(1));
                 worker.report("shadows", before + (share * f64::from(missing[place].1)) as u32, all);
-            })?;
+            };
+            // Coarse surfaces are not counted: a second or two.
+            bake::ensure(&baker, &cache, &still, &coarse, &|_, _, _| worker.report("shadows", 0, all))?;
+            worker.send(());
+            bake::ensure(&baker, &cache, &scene, &needs, &told)?;
             drop(baker);
             Messages::into_result(device.take_validation_messages())
         }));
         Ok(())
     }
 
-    /// Shows the scene without shadows where they take longer than a moment.
+    /// Shows the scene without shadows where they take longer than a moment, and lit once coarse surfaces are baked.
     pub(super) fn preview(&mut self) -> Result<()> {
-        let waits = self.bake.as_ref().is_some_and(|bake| bake.elapsed() >= self.setup.preview_after);
-        if self.frame.is_some() || self.previewed || !waits {
+        let Some(bake) = self.bake.as_ref().filter(|_| self.frame.is_none()) else { return Ok(()) };
+        let is_lit = !bake.results().is_empty();
+        let waits = bake.elapsed() >= self.setup.preview_after && self.previewed == Previewed::Nothing;
+        if !is_lit && !waits {
             return Ok(());
         }
-        self.previewed = true;
+        self.previewed = if is_lit { Previewed::Light } else { Previewed::Shapes };
         let options = frame::Options { size: self.size, ..self.setup.frame };
-        let preview = preview(&self.baker, &self.setup.cache, &self.editor, options);
+        let make = if is_lit { preview::lit } else { preview::shapes };
+        let preview = make(&self.baker, &self.setup.cache, &self.editor, options);
+        self.settle()?;
         self.preview = self.tolerate(preview)?;
         self.pending.camera = true;
         Ok(())

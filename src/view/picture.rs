@@ -4,6 +4,7 @@ use super::outline::outline;
 use super::preview;
 use super::save::unedited;
 use super::status::HISTORY;
+use super::viewer::Previewed;
 use super::viewer::{ERROR, REFERENCE, Viewer};
 use crate::asset::edges::Edges;
 use crate::asset::picture;
@@ -67,7 +68,7 @@ impl Viewer {
         let light = self.frame.is_some() && (pending.light() || pending.variant || stale);
         let mut frame = self.frame.as_mut();
         if let (None, Some(preview)) = (&frame, &mut self.preview) {
-            // It has no suns, which stand behind the entities of the file.
+            // One without shadows has no suns, which stand behind the entities of the file.
             placements.truncate(preview.scene().entities.len());
             frame = Some(preview);
         }
@@ -141,7 +142,10 @@ impl Viewer {
     /// Viewports of the picture: the merged light or its error, and the reference on the right of it.
     fn viewports(&self, [width, height]: [u32; 2]) -> Vec<Viewport> {
         if self.frame.is_none() {
-            return vec![preview::viewport([width, height])];
+            return vec![match self.previewed {
+                Previewed::Light => Viewport::merged([0, 0, width, height]),
+                Previewed::Shapes | Previewed::Nothing => preview::viewport([width, height]),
+            }];
         }
         let [own_width, _] = self.own_size_of([width, height]);
         let mut own = Viewport::merged([0, 0, own_width, height]);

@@ -51,6 +51,16 @@ pub struct Setup {
     pub preview_after: Duration,
 }
 
+/// What a preview shows.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Previewed {
+    Nothing,
+    /// Shapes without shadows.
+    Shapes,
+    /// Light on coarse surfaces.
+    Light,
+}
+
 /// A line for the user.
 pub(super) struct Message {
     pub(super) since: Instant,
@@ -66,10 +76,9 @@ pub struct Viewer {
     pub(super) input: Input,
     pub(super) baker: Baker,
     pub(super) frame: Option<Frame>,
-    /// The scene without shadows, while the first bake takes longer than a moment.
+    /// The scene without shadows, or lit on coarse surfaces, while the first bake takes longer than a moment.
     pub(super) preview: Option<Frame>,
-    /// Whether that was begun.
-    pub(super) previewed: bool,
+    pub(super) previewed: Previewed,
     pub(super) show: Show,
     pub(super) overlay: Overlay,
     pub(super) egui: egui::Context,
@@ -126,7 +135,7 @@ impl Viewer {
             input: Input::new(scale),
             frame: None,
             preview: None,
-            previewed: false,
+            previewed: Previewed::Nothing,
             flights: VecDeque::new(),
             pending: Changed { scene: true, ..Changed::default() },
             outgrown: false,
@@ -194,6 +203,11 @@ impl Viewer {
     /// Whether the pointer drags the scene or an entity.
     pub fn is_dragging(&self) -> bool {
         self.input.is_dragging()
+    }
+
+    /// What is shown in place of the frame until its fields are baked.
+    pub fn previewed(&self) -> Previewed {
+        self.previewed
     }
 
     /// Whether a background bake is running, or may have to.

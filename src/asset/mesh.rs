@@ -42,6 +42,7 @@ pub struct Mesh {
     content_hash: [u8; 32],
     panel: Option<LampFace>,
     rectangle: Option<Rectangle>,
+    two_sided: bool,
 }
 
 /// What vertices may have besides positions and normals; each array has one element per position, or is left out. Meshes
@@ -137,6 +138,7 @@ impl Mesh {
             content_hash,
             panel: None,
             rectangle: None,
+            two_sided: false,
         };
         mesh.rectangle = outline::rectangle(&mesh);
         Ok(mesh)
@@ -246,6 +248,27 @@ impl Mesh {
             content_hash,
             ..self.clone()
         }
+    }
+
+    /// The mesh with the backs of its triangles as triangles of their own, which are lit by themselves.
+    pub(crate) fn with_backs(mut self) -> Self {
+        let count = self.positions.len() as u32;
+        self.positions.extend_from_within(..);
+        self.normals.extend_from_within(..);
+        self.normals[count as usize..].iter_mut().for_each(|normal| *normal = -*normal);
+        self.colors.iter_mut().for_each(|colors| colors.extend_from_within(..));
+        self.uvs.iter_mut().for_each(|uvs| uvs.extend_from_within(..));
+        self.tints.iter_mut().for_each(|tints| tints.extend_from_within(..));
+        let backs: Vec<[u32; 3]> = self.triangles.iter().map(|[a, b, c]| [a + count, c + count, b + count]).collect();
+        self.triangles.extend(backs);
+        self.content_hash = hash(&self.positions, &self.normals, &self.attributes(), &self.triangles);
+        self.two_sided = true;
+        self
+    }
+
+    /// Whether the backs of triangles are triangles too. Of a mesh as it was read, they are the second half.
+    pub fn is_two_sided(&self) -> bool {
+        self.two_sided
     }
 
     /// The mesh as one that has holes: neither closed nor a rectangle.

@@ -20,12 +20,13 @@ pub fn pierced(mesh: &Mesh, texture: &Texture) -> Option<Mesh> {
     let texels = texture.texels.as_ref().filter(|texels| texture.alpha_cutoff.is_some() && texels.has_alpha())?;
     let size = Vec2::new(texels.width as f32, texels.height as f32);
     let (_, radius_m) = mesh.bounding_sphere();
-    let sides = |triangle: &[u32; 3]| {
+    let sides_of = |triangle: &[u32; 3]| {
         let [a, b, c] = triangle.map(|v| v as usize);
         [[a, b], [b, c], [c, a]]
     };
     let wanted = |triangle: &[u32; 3]| {
-        let longest = |length: &dyn Fn([usize; 2]) -> f32| sides(triangle).map(length).into_iter().fold(0.0, f32::max);
+        let longest =
+            |length: &dyn Fn([usize; 2]) -> f32| sides_of(triangle).map(length).into_iter().fold(0.0, f32::max);
         let in_texels = longest(&|[a, b]| ((uvs[a] - uvs[b]) * size).length()) / TEXELS;
         let in_radii = longest(&|[a, b]| mesh.positions[a].distance(mesh.positions[b])) / (LEAST_EDGE * radius_m);
         in_texels.min(in_radii.max(LEAST_CUTS)).max(1.0)
@@ -35,7 +36,9 @@ pub fn pierced(mesh: &Mesh, texture: &Texture) -> Option<Mesh> {
     let mut positions = Vec::new();
     let mut triangles = Vec::new();
     let mut holes = 0;
-    for triangle in &mesh.triangles {
+    // Backs cover nothing more.
+    let sides = if mesh.is_two_sided() { 2 } else { 1 };
+    for triangle in &mesh.triangles[..mesh.triangles.len() / sides] {
         let cuts = (wanted(triangle) * coarser).ceil() as usize;
         let corners = triangle.map(|v| mesh.positions[v as usize]);
         let first = positions.len() as u32;

@@ -25,6 +25,18 @@ pub enum Wrap {
 }
 
 impl Wrap {
+    /// The texel of a row of `count` that a whole number of texels from its start stands for.
+    pub fn whole(self, at: i32, count: i32) -> i32 {
+        match self {
+            Wrap::Repeat => at.rem_euclid(count),
+            Wrap::Clamp => at.clamp(0, count - 1),
+            Wrap::Mirror => {
+                let within = at.rem_euclid(2 * count);
+                within.min(2 * count - 1 - within)
+            }
+        }
+    }
+
     /// The texel of a row of `count` that a coordinate falls into.
     fn texel(self, at: f32, count: usize) -> usize {
         let within = match self {

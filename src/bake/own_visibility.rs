@@ -544,7 +544,7 @@ mod tests {
             in_map: with_map.then_some(&[false, false, false, false, false, false, false, true]),
         };
         let standing = Standing { rotation: DMat3::IDENTITY, radius: 1.0 };
-        see(&Blockers::new(corners.map(triangle), Vec::new()), &standing, &eye, 4, Rays::Many, counts)
+        see(&Blockers::new(corners.map(triangle), Vec::new(), Vec::new()), &standing, &eye, 4, Rays::Many, counts)
     }
 
     /// Directions all over the sphere, of equal areas: a Fibonacci lattice.
@@ -596,7 +596,8 @@ mod tests {
             let [a, b, c, d] = corners.map(|[across, y]| Vec3::new(x + across, y, 1.0));
             [(0, [a, b, c]), (0, [a, c, d])]
         };
-        let blockers = Blockers::new((-20..20).flat_map(|i| bar(0.15 * i as f32)).map(triangle), Vec::new());
+        let blockers =
+            Blockers::new((-20..20).flat_map(|i| bar(0.15 * i as f32)).map(triangle), Vec::new(), Vec::new());
         let standing = Standing { rotation: DMat3::IDENTITY, radius: 1.0 };
         let [mut mean, mut square] = [0.0; 2];
         const PLACES: usize = 400;
@@ -650,7 +651,7 @@ mod tests {
         let see_with = |in_map: &[bool], corners: &[(u32, [Vec3; 3])]| {
             let counts = Counts { blocks: &[true; 2], in_map: Some(in_map) };
             see(
-                &Blockers::new(corners.iter().copied().map(triangle), Vec::new()),
+                &Blockers::new(corners.iter().copied().map(triangle), Vec::new(), Vec::new()),
                 &standing,
                 &eye,
                 4,

@@ -3,13 +3,12 @@
 
 use super::triangles::weights;
 use crate::asset::Mesh;
-use crate::asset::texture::Texture;
-use glam::{Mat3A, Vec3, Vec3A};
+use crate::asset::texture::{Texture, Wrap};
+use glam::{Mat3A, Vec2, Vec3, Vec3A};
 use obvhs::BvhBuildParams;
 use obvhs::bvh2::{Bvh2, builder::build_bvh2_from_tris};
 use obvhs::triangle::Triangle;
 use pulp::{Arch, Simd, WithSimd};
-use std::sync::Arc;
 use std::time::Duration;
 
 /// Rays of a packet.
@@ -27,20 +26,50 @@ pub struct Blockers {
     numbers: Vec<u32>,
     /// Holes of each member's surface; empty where none has any.
     masks: Vec<Option<Mask>>,
+    /// Of each member whose backs are triangles too, which do not stand here: how far behind its fronts they come.
+    backs: Vec<Option<u32>>,
 }
 
 /// A surface that has holes.
 #[derive(Clone)]
 pub struct Mask {
-    pub mesh: Arc<Mesh>,
-    pub texture: Arc<Texture>,
+    /// For each triangle the place of its first corner in texels, and the ways from there to the others.
+    corners: Vec<[Vec2; 3]>,
+    size: [i32; 2],
+    wrap: [Wrap; 2],
+    /// Of every texel.
+    is_hole: Vec<bool>,
 }
 
 impl Mask {
+    /// The holes that a texture makes in a mesh; `None` where it makes none.
+    pub fn new(mesh: &Mesh, texture: &Texture) -> Option<Self> {
+        let (texels, uvs) = texture.texels.as_ref().zip(mesh.uvs.as_ref())?;
+        let cutoff = texture.alpha_cutoff?;
+        let size = Vec2::new(texels.width as f32, texels.height as f32);
+        // Rows run downwards.
+        let place = |v: u32| Vec2::new(uvs[v as usize].x, 1.0 - uvs[v as usize].y) * size;
+        let corners = |triangle: &[u32; 3]| {
+            let [a, b, c] = triangle.map(place);
+            [a, b - a, c - a]
+        };
+        Some(Mask {
+            corners: mesh.triangles.iter().map(corners).collect(),
+            size: [texels.width as i32, texels.height as i32],
+            wrap: texture.wrap,
+            is_hole: texels.rgba.iter().map(|texel| f32::from(texel[3]) / 255.0 < cutoff).collect(),
+        })
+    }
+
     /// Whether a place of a triangle, given by the weights of its second and third corner, is a hole.
     fn is_hole(&self, triangle: u32, [v, w]: [f32; 2]) -> bool {
-        let corners = self.mesh.triangles[triangle as usize];
-        self.texture.opacity_at(&self.mesh, corners, [1.0 - v - w, v, w]) < 0.5
+        let [first, second, third] = self.corners[triangle as usize];
+        let place = first + v * second + w * third;
+        let texel = |at: f32, axis: usize| {
+            let below = at as i32;
+            self.wrap[axis].whole(below - i32::from((below as f32) > at), self.size[axis]) as usize
+        };
+        self.is_hole[texel(place.y, 1) * self.size[0] as usize + texel(place.x, 0)]
     }
 }
 
@@ -68,8 +97,9 @@ pub struct BlockerHit {
     pub member: u32,
     /// Its place in the hierarchy.
     index: u32,
-    /// Whether the ray meets its back.
+    /// Whether the ray meets its back, where that is no triangle too.
     pub from_behind: bool,
+    on_back: bool,
 }
 
 struct Packet {
@@ -210,8 +240,12 @@ impl WithSimd for Cast<'_> {
 }
 
 impl Blockers {
-    /// Builds the hierarchy; one of no triangles blocks nothing. `masks` are of each member, or empty.
-    pub fn new(triangles: impl IntoIterator<Item = BlockerTriangle>, masks: Vec<Option<Mask>>) -> Self {
+    /// Builds the hierarchy; one of no triangles blocks nothing. `masks` and `backs` are of each member, or empty.
+    pub fn new(
+        triangles: impl IntoIterator<Item = BlockerTriangle>,
+        masks: Vec<Option<Mask>>,
+        backs: Vec<Option<u32>>,
+    ) -> Self {
         let of: Vec<BlockerTriangle> = triangles.into_iter().collect();
         let triangle = |BlockerTriangle { corners: [a, b, c], .. }: &BlockerTriangle| Triangle {
             v0: (*a).into(),
@@ -229,6 +263,7 @@ impl Blockers {
             triangles: hierarchy.primitive_indices.iter().map(corners).collect(),
             members: hierarchy.primitive_indices.iter().map(|&i| of[i as usize].member).collect(),
             numbers: hierarchy.primitive_indices.iter().map(|&i| of[i as usize].number).collect(),
+            backs,
             masks: if masks.iter().any(Option::is_some) { masks } else { Vec::new() },
             hierarchy,
         }
@@ -308,18 +343,28 @@ impl Blockers {
         if triangle == u32::MAX {
             return None;
         }
+        let member = self.members[triangle as usize];
+        let is_behind = self.triangles[triangle as usize].normal.dot(packet.toward(lane)) > 0.0;
+        let has_back = self.backs.get(member as usize).is_some_and(Option::is_some);
         Some(BlockerHit {
             distance: packet.distance[lane],
-            member: self.members[triangle as usize],
+            member,
             index: triangle,
-            from_behind: self.triangles[triangle as usize].normal.dot(packet.toward(lane)) > 0.0,
+            from_behind: is_behind && !has_back,
+            on_back: is_behind && has_back,
         })
     }
 
     /// Which triangle of the member's mesh a ray meets, and where: the weights of its second and third corner.
     pub fn place(&self, origin: Vec3A, direction: Vec3A, hit: &BlockerHit) -> (u32, [f32; 2]) {
         let Corners { corner, edges, .. } = self.triangles[hit.index as usize];
-        (self.numbers[hit.index as usize], weights(edges, origin + hit.distance * direction - corner))
+        let number = self.numbers[hit.index as usize];
+        let [second, third] = weights(edges, origin + hit.distance * direction - corner);
+        match self.backs.get(hit.member as usize) {
+            // A back runs around the other way.
+            Some(Some(count)) if hit.on_back => (number + count, [third, second]),
+            _ => (number, [second, third]),
+        }
     }
 }
 
@@ -328,9 +373,9 @@ mod tests {
     use super::*;
     use crate::asset::generate;
     use crate::asset::mesh::Attributes;
-    use crate::asset::texture::{Texels, Wrap};
+    use crate::asset::texture::Texels;
     use crate::sh::quadrature::random_direction;
-    use glam::Vec2;
+    use std::sync::Arc;
 
     /// Against every triangle by itself.
     #[test]
@@ -339,7 +384,7 @@ mod tests {
         let corners: Vec<[Vec3; 3]> = mesh.triangles.iter().map(|t| t.map(|i| mesh.positions[i as usize])).collect();
         let triangle =
             |(number, corners): (u32, &[Vec3; 3])| BlockerTriangle { member: number % 2, number, corners: *corners };
-        let blockers = Blockers::new((0..).zip(&corners).map(triangle), Vec::new());
+        let blockers = Blockers::new((0..).zip(&corners).map(triangle), Vec::new(), Vec::new());
         let mut rng = fastrand::Rng::with_seed(3);
         let mut hits = Vec::new();
         let mut met = 0;
@@ -369,7 +414,7 @@ mod tests {
             }
         }
         assert!((300..3300).contains(&met), "{met}");
-        Blockers::new([], Vec::new()).first(Vec3A::ZERO, &Mat3A::IDENTITY, &[Vec3A::X], &[], &mut hits);
+        Blockers::new([], Vec::new(), Vec::new()).first(Vec3A::ZERO, &Mat3A::IDENTITY, &[Vec3A::X], &[], &mut hits);
         assert_eq!(hits, [None]);
     }
 
@@ -384,13 +429,8 @@ mod tests {
         // The left half has no holes.
         let rgba = (0..16).map(|i| [255, 255, 255, if i % 4 < 2 { 255 } else { 0 }]).collect();
         let texels = Some(Arc::new(Texels { width: 4, height: 4, rgba }));
-        let texture = Arc::new(Texture {
-            texels,
-            wrap: [Wrap::Repeat; 2],
-            factor: Vec3::ONE,
-            alpha_cutoff: Some(0.5),
-            alpha_blend: false,
-        });
+        let texture =
+            Texture { texels, wrap: [Wrap::Repeat; 2], factor: Vec3::ONE, alpha_cutoff: Some(0.5), alpha_blend: false };
         let square = |member: u32, z: f32| {
             let mesh = &mesh;
             (0..2).map(move |number: u32| {
@@ -398,9 +438,12 @@ mod tests {
                 BlockerTriangle { member, number, corners }
             })
         };
-        let mask = Some(Mask { mesh: mesh.clone(), texture });
-        let blockers =
-            Blockers::new(square(0, 1.0).chain(square(1, 2.0)).chain(square(2, 3.0)), vec![mask.clone(), mask, None]);
+        let mask = Mask::new(&mesh, &texture);
+        let blockers = Blockers::new(
+            square(0, 1.0).chain(square(1, 2.0)).chain(square(2, 3.0)),
+            vec![mask.clone(), mask, None],
+            Vec::new(),
+        );
         let mut hits = Vec::new();
         for (x, distance) in [(0.3, 1.0), (0.7, 3.0)] {
             blockers.first(Vec3A::new(x, 0.5, 0.0), &Mat3A::IDENTITY, &[Vec3A::Z], &[true; 3], &mut hits);

@@ -336,10 +336,14 @@ impl<'p> Group<'p> {
                 let number = all.find(|(_, of)| *of == vertices).map_or(0, |(number, _)| number);
                 BlockerTriangle { member: index, number, corners: vertices.map(|v| positions[v as usize]) }
             };
-            distinct(mesh).iter().map(triangle).collect::<Vec<_>>()
+            // Backs lie where their fronts do.
+            let sides = if mesh.is_two_sided() { 2 } else { 1 };
+            distinct(mesh).iter().take(mesh.triangles.len() / sides).map(triangle).collect::<Vec<_>>()
         });
-        let mask = |member: &Member| Some(Mask { mesh: member.mesh.clone(), texture: member.mask.clone()? });
-        let blockers = Blockers::new(triangles, plan.members.iter().map(mask).collect());
+        let mask = |member: &Member| Mask::new(&member.mesh, member.mask.as_ref()?);
+        let backs = |member: &Member| member.mesh.is_two_sided().then(|| member.mesh.triangles.len() as u32 / 2);
+        let masks = plan.members.iter().map(mask).collect();
+        let blockers = Blockers::new(triangles, masks, plan.members.iter().map(backs).collect());
         Group { plan, blockers, centre, radius_m, standings, spheres }
     }
 

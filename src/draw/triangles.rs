@@ -183,17 +183,17 @@ enum Form {
     /// The same over what lies behind.
     Over { culls: bool },
     /// Pixels evaluate sharp lights.
-    Pixels,
+    Pixels { culls: bool },
 }
 
 impl Form {
-    const COUNT: usize = 5;
+    const COUNT: usize = 6;
 
     fn number(self) -> usize {
         match self {
             Form::Vertices { culls } => usize::from(culls),
             Form::Over { culls } => 2 + usize::from(culls),
-            Form::Pixels => 4,
+            Form::Pixels { culls } => 4 + usize::from(culls),
         }
     }
 }
@@ -221,9 +221,10 @@ impl DrawTriangles {
                 let state = GraphicsState { cull, keeps, ..*state };
                 self.maker.make("draw", &Self::rows(*display, look, is_over), state)
             }
-            Form::Pixels => {
+            Form::Pixels { culls } => {
                 let sharp = sharp.as_ref().expect("pixels evaluate lights where a scene has sharp ones");
-                let nearer = GraphicsState { nearer_steps: NEARER_STEPS, ..*state };
+                let cull = if culls { vk::CullModeFlags::BACK } else { vk::CullModeFlags::NONE };
+                let nearer = GraphicsState { cull, nearer_steps: NEARER_STEPS, ..*state };
                 self.maker.make("draw triangle pixels", &Self::patch_rows(*display, look, sharp), nearer)
             }
         })
@@ -329,7 +330,7 @@ impl DrawTriangles {
     ) -> Result<()> {
         let Some(by_pixel) = entity.by_pixel.filter(|_| self.maker.sharp.is_some()) else { return Ok(()) };
         let (look, paint, gloss) = self.look(entity, viewport);
-        let pipeline = self.pipeline(look, Form::Pixels)?;
+        let pipeline = self.pipeline(look, Form::Pixels { culls: entity.culls })?;
         drawing.bind(pipeline, &[], &mesh.indices);
         let mut binds = light.binds(
             &[(&mesh.indices, vk::Format::R32_UINT), (viewport.radiosity, vk::Format::R32G32B32A32_SFLOAT)],

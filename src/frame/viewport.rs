@@ -97,7 +97,7 @@ impl Frame {
                 mesh: &surface.drawn,
                 indices: surface.drawn.seen(self.options.skip.hidden.then_some(&sight)),
                 clip_from_object: (camera.clip_from_world * world_from_object).as_mat4(),
-                culls: sight.culls(),
+                culls: sight.culls() || self.scene.meshes[entity.mesh].is_two_sided(),
                 emission: entity.emission,
                 radiosity_offset: self.radiosity.offsets[index],
                 tag: if entity.transparent { self.scene.opacity(index) } else { smooth::tag(index) },

@@ -233,7 +233,9 @@ impl<'s> World<'s> {
         let corners = mesh.triangles[triangle];
         let normal: DVec3 =
             corners.iter().zip(weights).map(|(i, w)| mesh.normals[*i as usize].as_dvec3() * f64::from(w)).sum();
-        let normal = normal.normalize_or(DVec3::Y);
+        // Backs that are triangles too lie where the fronts do: a ray meets the side that faces it.
+        let turn = if mesh.is_two_sided() && normal.dot(direction.as_dvec3()) > 0.0 { -1.0 } else { 1.0 };
+        let normal = turn * normal.normalize_or(DVec3::Y);
         let (gloss, tilted) = self.scene.gloss_at(sight.entity, corners, weights, normal.as_vec3());
         Some(SurfaceHit {
             place: (sight.origin + distance * direction).as_dvec3(),

@@ -14,6 +14,7 @@
 //! | meshes compressed by Draco and meshoptimizer; KTX2 and WebP | as if they were not |
 //! | base colour factor | albedo |
 //! | base colour texture, colours of vertices, alpha mask | texture; tints of the mesh's vertices |
+//! | double-sided surfaces that alpha cuts out | backs of their own; all others are lit from their fronts |
 //! | alpha blending, transmission | opacity, of transmission less the luminance of what passes: glass is thin and grey |
 //! | roughness, metal, index of refraction, specular factor | gloss |
 //! | textures of roughness and metal, of normals | maps |
@@ -243,7 +244,9 @@ impl Reader {
             let what = format!("over the limit of {TRIANGLES_LIMIT} triangles in all");
             return Err(self.document.fail(&primitive.shape.place, what));
         }
-        primitive.shape.mesh(&self.document, name, bend, primitive.surface.attributes.clone())
+        let has_backs = primitive.surface.has_backs;
+        let mesh = primitive.shape.mesh(&self.document, name, bend, primitive.surface.attributes.clone())?;
+        Ok(if has_backs && !mesh.is_closed() { mesh.with_backs() } else { mesh })
     }
 
     /// Reads a part once.

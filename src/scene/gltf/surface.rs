@@ -52,6 +52,8 @@ pub struct Surface {
     pub paint: Option<Paint>,
     /// How it reflects besides; an unlit surface does not.
     pub gloss: Option<Gloss>,
+    /// Whether an open shape that this covers has two sides: it is cut out by a texture, as leaves are.
+    pub has_backs: bool,
     /// Share of light that does not pass; a texture may be another factor.
     pub opacity: f32,
     /// Its textures for that: gloss, normal and emission.
@@ -97,6 +99,7 @@ impl Surface {
             _ => None,
         };
         let alpha_blend = matches!(json.alpha_mode, Checked::Valid(AlphaMode::Blend));
+        let has_backs = json.double_sided && applied.is_some() && (alpha_blend || alpha_cutoff.is_some());
         let paint = (applied.is_some() || attributes.tints.is_some()).then(|| Paint {
             image: applied.as_ref().map(|applied| applied.image),
             texture: Texture {
@@ -136,7 +139,7 @@ impl Surface {
         let (emission, colors) = glow(document, json, &place, shape, textures, notes)?;
         maps[2] = of_emission.filter(|_| emission != Vec3::ZERO);
         attributes.colors = colors;
-        Ok(Surface { albedo, paint, gloss, opacity, maps, emission, attributes })
+        Ok(Surface { albedo, paint, gloss, has_backs, opacity, maps, emission, attributes })
     }
 }
 

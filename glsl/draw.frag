@@ -7,6 +7,7 @@ layout(location = 0) out vec4 color; // alpha: the entity's tag
 layout(location = 1) centroid in vec3 light; // of a surface of the mean reflectance
 layout(location = 2) centroid in vec2 uv;
 layout(binding = 0) uniform sampler2D picture;
+#include "holes.glsl"
 #endif
 #if GLOSS
 layout(location = 3) centroid in vec3 tint;
@@ -48,11 +49,12 @@ void main() {
     vec3 shown = radiance.rgb;
 #if PAINTED
     vec4 texel = texture(picture, within * uv);
-    if (texel.a < push.paint.w) {
-        discard;
-    }
+    cut_holes(texel.a, push.paint.w);
     vec3 over_mean = push.paint.rgb * texel.rgb;
 #if OVER
+    if (texel.a < 0.004) {
+        discard;
+    }
     over_mean *= texel.a;
     float opacity = push.tag * texel.a;
 #endif

@@ -14,6 +14,7 @@ layout(location = 3) centroid in vec3 emission;
 layout(location = 4) centroid in vec2 uv;
 layout(location = 5) centroid in vec3 tint;
 layout(binding = 12) uniform sampler2D picture;
+#include "holes.glsl"
 #endif
 layout(location = 0) out vec4 color; // alpha: the entity's tag
 
@@ -31,9 +32,7 @@ void main() {
     float within = within_triangle(weights.x + weights.y + weights.z);
 #if PAINTED
     vec4 texel = texture(picture, within * uv);
-    if (texel.a < push.paint.w) {
-        discard;
-    }
+    cut_holes(texel.a, push.paint.w);
     vec3 reflectance = push.paint.rgb * texel.rgb * within * tint;
 #else
     vec3 reflectance = vec3(1.0);

@@ -77,7 +77,7 @@ const MOST_FAR: usize = 512;
 
 impl Linked {
     /// The links of a scene's entities, of which those of one list of `rigid` never move against each other; `None` where
-    /// no vertex has any, or where there are more runs than links can number.
+    /// no vertex has any and nothing moves, or where there are more runs than links can number.
     pub fn new(entities: &[LinkedEntity<'_>], rigid: &[Vec<usize>]) -> Option<Self> {
         let vertices = entities.iter().map(|entity| entity.order.len()).sum();
         let mut linked = Linked { areas: vec![0.0; vertices], ranges: vec![[0, 0]; vertices], ..Linked::default() };
@@ -107,7 +107,12 @@ impl Linked {
             log::warn!("light does not bounce: {} runs of vertices are more than links number", linked.runs.len());
             return None;
         }
-        (!linked.links.is_empty()).then_some(linked)
+        if linked.links.is_empty() && linked.moved.is_empty() {
+            return None;
+        }
+        // No buffer is empty.
+        linked.links.extend(linked.links.is_empty().then_some(0));
+        Some(linked)
     }
 
     /// Adds the smallest runs of a group of which there are not too many.
@@ -135,11 +140,13 @@ impl Linked {
     }
 
     fn add(&mut self, index: usize, entity: &LinkedEntity<'_>, base: u32) {
-        let Some(links) = &entity.links else { return };
         let areas = entity.mesh.vertex_areas_m2();
-        let mut from = self.links.len() as u32;
-        for ((place, &v), &count) in (entity.first..).zip(entity.order).zip(&links.counts) {
+        for (place, &v) in (entity.first..).zip(entity.order) {
             self.areas[place] = areas[v as usize] as f32;
+        }
+        let Some(links) = &entity.links else { return };
+        let mut from = self.links.len() as u32;
+        for (place, &count) in (entity.first..).zip(&links.counts) {
             self.ranges[place] = [from, u32::from(count) | (index as u32) << 8];
             from += u32::from(count);
         }

@@ -44,6 +44,7 @@ embedded!(
     "gloss_vertex.glsl",
     "grid.frag",
     "grid.vert",
+    "holes.glsl",
     "lists.glsl",
     "merge.comp",
     "merge_cap.glsl",

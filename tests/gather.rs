@@ -31,6 +31,7 @@ fn random_entities(rng: &mut fastrand::Rng, count: usize, spread_m: f64, corner:
             sharp: i % 100 == 25,
             centre: corner + DVec3::new(rng.f64() - 0.5, 0.1 * rng.f64(), rng.f64() - 0.5) * spread_m,
             radius_m: 0.1 + 0.4 * rng.f64(),
+            reflectance: 0.3 + 0.7 * rng.f64(),
             occludes: i % 5 != 0,
             emits: i % 25 == 0,
             coloured: i % 50 == 0,
@@ -55,7 +56,6 @@ impl Crowded {
             centre: own.centre.as_vec3().extend(1.0 / own.radius_m as f32).to_array(),
             alpha_beta: [turns[0], turns[1], turns[2], turns[3]],
             gamma: [turns[4], turns[5]],
-            albedo: [(0.3 + 0.7 * rng.f32()) / std::f32::consts::PI; 3],
             scale: 0.5 + rng.f32(),
             ..Default::default()
         };

@@ -98,8 +98,13 @@ fn drawing() -> Vec<ShaderPermutation> {
         .into_iter()
         .flat_map(|display| looks.iter().map(move |look| (display, *look)))
         .flat_map(|(display, look)| {
-            let patches = sharp.iter().flat_map(move |sharp| DrawTriangles::patch_rows(display, look, sharp));
-            [false, true].into_iter().flat_map(move |over| DrawTriangles::rows(display, look, over)).chain(patches)
+            // Alone, and of four samples a pixel.
+            let of = |samples: u32| {
+                let patches = sharp.iter().flat_map(|sharp| DrawTriangles::patch_rows(display, samples, look, sharp));
+                let over = [false, true].map(|over| DrawTriangles::rows(display, samples, look, over));
+                over.into_iter().flatten().chain(patches).collect::<Vec<_>>()
+            };
+            [of(1), of(4)].concat()
         });
     let fragments = grids.chain(triangles);
     fragments

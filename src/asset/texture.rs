@@ -222,9 +222,9 @@ impl Texture {
         self.alpha_cutoff.map_or(alpha, |cutoff| if alpha < cutoff { 0.0 } else { 1.0 })
     }
 
-    /// The mean share of light that a mesh's surface keeps back beside its holes.
+    /// The mean share of light that a mesh's surface keeps back.
     pub fn mean_opacity(&self, mesh: &Mesh) -> f32 {
-        if !self.alpha_blend {
+        if !self.alpha_blend && self.alpha_cutoff.is_none() {
             return 1.0;
         }
         self.mean_of(mesh, |corners, weights| Vec3::splat(self.opacity_at(mesh, corners, weights))).x.min(1.0)

@@ -364,7 +364,7 @@ impl Draw {
                         let [left, top, width, height] = viewport.area;
                         drawing.area(left, top, width, height);
                         if let DrawnMesh::Triangles(mesh) = entity.mesh {
-                            self.triangles.bind(drawing, mesh, entity, viewport, white)?;
+                            self.triangles.bind(drawing, mesh, entity, viewport, white, false)?;
                         }
                         bound = Some(entity);
                     }
@@ -387,7 +387,7 @@ impl Draw {
 }
 
 impl Draw {
-    /// Draws transparent entities, whose depth nothing keeps, over everything else.
+    /// Draws transparent entities over everything else, from far to near.
     fn record_transparent<'r>(
         &'r self,
         drawing: &mut Drawing<'_, 'r>,
@@ -399,8 +399,11 @@ impl Draw {
             for entity in viewport.entities.iter().filter(|entity| entity.transparent && !entity.indices.is_empty()) {
                 let DrawnMesh::Triangles(mesh) = entity.mesh else { continue };
                 drawing.area(left, top, width, height);
-                self.triangles.bind(drawing, mesh, entity, viewport, white)?;
-                entity.indices.iter().for_each(|range| drawing.indexed(range.clone()));
+                // Of one entity the nearest place alone is seen, in whatever order its triangles come.
+                for depth in [true, false] {
+                    self.triangles.bind(drawing, mesh, entity, viewport, white, depth)?;
+                    entity.indices.iter().for_each(|range| drawing.indexed(range.clone()));
+                }
             }
         }
         Ok(())

@@ -179,21 +179,31 @@ const GLOSS_BINDINGS: [u32; 2] = [2, 13];
 #[derive(Clone, Copy)]
 enum Form {
     /// Both sides of triangles, or the fronts alone.
-    Vertices { culls: bool },
-    /// The same over what lies behind.
-    Over { culls: bool },
+    Vertices {
+        culls: bool,
+    },
+    /// The same over what lies behind: first the depth of what is nearest, then its colour.
+    OverDepth {
+        culls: bool,
+    },
+    Over {
+        culls: bool,
+    },
     /// Pixels evaluate sharp lights.
-    Pixels { culls: bool },
+    Pixels {
+        culls: bool,
+    },
 }
 
 impl Form {
-    const COUNT: usize = 6;
+    const COUNT: usize = 8;
 
     fn number(self) -> usize {
         match self {
             Form::Vertices { culls } => usize::from(culls),
-            Form::Over { culls } => 2 + usize::from(culls),
-            Form::Pixels { culls } => 4 + usize::from(culls),
+            Form::OverDepth { culls } => 2 + usize::from(culls),
+            Form::Over { culls } => 4 + usize::from(culls),
+            Form::Pixels { culls } => 6 + usize::from(culls),
         }
     }
 }
@@ -214,18 +224,22 @@ impl DrawTriangles {
     fn pipeline(&self, look: Look<'_>, form: Form) -> Result<&GraphicsPipeline> {
         let PipelineMaker { state, display, sharp, .. } = &self.maker;
         made_once(&self.made[look.number()][form.number()], || match form {
-            Form::Vertices { culls } | Form::Over { culls } => {
-                let is_over = matches!(form, Form::Over { .. });
+            Form::Vertices { culls } | Form::OverDepth { culls } | Form::Over { culls } => {
                 let cull = if culls { vk::CullModeFlags::BACK } else { vk::CullModeFlags::NONE };
-                let keeps = if is_over { Keeps::ColorOver } else { state.keeps };
-                let state = GraphicsState { cull, keeps, ..*state };
-                self.maker.make("draw", &Self::rows(*display, look, is_over), state)
+                let keeps = match form {
+                    Form::OverDepth { .. } => Keeps::Depth,
+                    Form::Over { .. } => Keeps::ColorOver,
+                    _ => state.keeps,
+                };
+                let is_over = keeps != state.keeps;
+                let rows = Self::rows(*display, state.samples, look, is_over);
+                self.maker.make("draw", &rows, GraphicsState { cull, keeps, ..*state })
             }
             Form::Pixels { culls } => {
                 let sharp = sharp.as_ref().expect("pixels evaluate lights where a scene has sharp ones");
                 let cull = if culls { vk::CullModeFlags::BACK } else { vk::CullModeFlags::NONE };
                 let nearer = GraphicsState { cull, nearer_steps: NEARER_STEPS, ..*state };
-                self.maker.make("draw triangle pixels", &Self::patch_rows(*display, look, sharp), nearer)
+                self.maker.make("draw triangle pixels", &Self::patch_rows(*display, state.samples, look, sharp), nearer)
             }
         })
     }
@@ -256,9 +270,9 @@ impl DrawTriangles {
 
     /// The rows of the shaders that show the light of vertices: vertex and fragment. With `over` what they draw lies over
     /// what is behind it.
-    pub fn rows(display: bool, look: Look<'_>, over: bool) -> [ShaderPermutation; 2] {
+    pub fn rows(display: bool, samples: u32, look: Look<'_>, over: bool) -> [ShaderPermutation; 2] {
         let row = |file| look.macros(ShaderPermutation::new(file, 4), GLOSS_BINDINGS[0]);
-        let fragment = row("draw.frag").define("DISPLAY", display).define("OVER", over);
+        let fragment = row("draw.frag").define("DISPLAY", display).define("OVER", over).define("SAMPLES", samples);
         let fragment = match look {
             Look::Glossy { highlights: Some(sharp), .. } => sharp.pixel_row(fragment, false),
             _ => fragment,
@@ -267,15 +281,19 @@ impl DrawTriangles {
     }
 
     /// The rows of the shaders whose pixels evaluate lights: vertex and fragment.
-    pub fn patch_rows(display: bool, look: Look<'_>, sharp: &SharpPermutation) -> [ShaderPermutation; 2] {
+    pub fn patch_rows(display: bool, samples: u32, look: Look<'_>, sharp: &SharpPermutation) -> [ShaderPermutation; 2] {
         let row = |file| look.macros(ShaderPermutation::new(file, 4), GLOSS_BINDINGS[1]);
         [
             row("triangle.vert").number("LEAST_PX", LEAST_PX),
-            sharp.pixel_row(row("triangle.frag").define("DISPLAY", display), sharp.self_shadows),
+            sharp.pixel_row(
+                row("triangle.frag").define("DISPLAY", display).define("SAMPLES", samples),
+                sharp.self_shadows,
+            ),
         ]
     }
 
-    /// Makes ready to draw ranges of an entity's indices in the area that was set.
+    /// Makes ready to draw ranges of an entity's indices in the area that was set: of a transparent one the `depth`, or
+    /// the colour over what lies behind.
     pub fn bind<'r>(
         &'r self,
         drawing: &mut Drawing<'_, 'r>,
@@ -283,13 +301,18 @@ impl DrawTriangles {
         entity: &DrawnEntity<'r>,
         viewport: &DrawnViewport<'r>,
         white: f32,
+        depth: bool,
     ) -> Result<()> {
         let mut vertices =
             vec![(&mesh.positions, 0), (&mesh.emission, 0), (viewport.radiosity, entity.radiosity_offset)];
         let (look, paint, gloss) = self.look(entity, viewport);
         vertices.extend(mesh.paint.iter().filter(|_| paint.is_some()).map(|paint| (paint, 0)));
         let culls = entity.culls;
-        let form = if entity.transparent { Form::Over { culls } } else { Form::Vertices { culls } };
+        let form = match entity.transparent {
+            true if depth => Form::OverDepth { culls },
+            true => Form::Over { culls },
+            false => Form::Vertices { culls },
+        };
         let pipeline = self.pipeline(look, form)?;
         drawing.bind(pipeline, &vertices, &mesh.indices);
         let push = EntityPush::new(entity, white);

@@ -238,7 +238,7 @@ impl Lattice {
         let bad = |what: String| Err(Error::Input(format!("lattice {self}: {what}")));
         let cells = u64::from(self.cells);
         if cells.is_multiple_of(2) {
-            return bad("the number of cells is odd".into());
+            return bad("the number of cells must be odd".into());
         }
         let columns = if self.has_edges() { cells + 2 } else { cells };
         let directions = columns.pow(2).saturating_mul(6);

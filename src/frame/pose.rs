@@ -71,6 +71,7 @@ impl Frame {
         EntityBounds {
             centre: self.centre(index, placement),
             radius_m: device_mesh.radius_m * f64::from(placement.scale),
+            reflectance: entity.reflection().map_or(f64::from(entity.albedo.max_element()), |_| 1.0),
             occludes: entity.occludes
                 && (holds(&device_mesh.blocked) || device_mesh.silhouette.is_some() || device_mesh.rectangle.is_some()),
             emits: entity.emits && (sharp || holds(source)),

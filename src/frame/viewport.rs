@@ -6,7 +6,7 @@ use crate::draw::smooth;
 use crate::draw::{DrawnEntity, DrawnPaint, camera};
 use crate::lists::sight::{self, Sight};
 use crate::scene::Placement;
-use glam::Vec3;
+use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 use std::ops::Range;
 
@@ -110,7 +110,7 @@ impl Frame {
             let radius_m = device_mesh.radius_m * f64::from(placement.scale);
             let distance_m = self.centre(index, placement).distance(camera.eye) - radius_m;
             let place = match entity.transparent {
-                true => (2, -distance_m),
+                true => (2, -self.box_distance_m(entity.mesh, placement, camera.eye)),
                 false => (u8::from(drawn.mesh.grid().is_some()), distance_m),
             };
             (place.0, place.1, drawn)
@@ -122,11 +122,21 @@ impl Frame {
         drawn.into_iter().map(|(_, _, entity)| entity).collect()
     }
 
+    /// How far a point is from the box around an entity: what of two panes lies in front is nearer, however large.
+    fn box_distance_m(&self, mesh: usize, placement: &Placement, point: DVec3) -> f64 {
+        let positions = &self.scene.meshes[mesh].positions;
+        let (low, high) = positions.iter().fold((Vec3::MAX, Vec3::MIN), |(l, h), p| (l.min(*p), h.max(*p)));
+        let scale = f64::from(placement.scale);
+        let own = placement.turn().inverse() * (point - placement.position.as_dvec3()) / scale;
+        scale * own.distance(own.clamp(low.as_dvec3(), high.as_dvec3()))
+    }
+
     /// What varies the reflectance of an entity. Its vertices are lit by the mean.
     fn paint(&self, index: usize) -> Option<DrawnPaint<'_>> {
         let texture = self.scene.paint(index)?;
         let entity = &self.scene.entities[index];
-        let over_mean = |factor: f32, mean: f32| if mean > 0.0 { factor / mean } else { 0.0 };
+        let opacity = self.scene.opacity(index);
+        let over_mean = |factor: f32, mean: f32| if mean > 0.0 { opacity * factor / mean } else { 0.0 };
         Some(DrawnPaint {
             texture: &self.buffers.textures[entity.texture?],
             tint: Vec3::from_array(std::array::from_fn(|c| over_mean(texture.factor[c], entity.albedo[c]))),

@@ -187,7 +187,9 @@ pub enum Keeps {
     Largest,
     /// The last over what was there before, by its alpha, with which its colour is premultiplied.
     Over,
-    /// As [`Keeps::Over`], but alpha and depth stay what they were.
+    /// Depth alone.
+    Depth,
+    /// As [`Keeps::Over`], of what is at least as near as its depth; alpha and depth stay what they were.
     ColorOver,
 }
 
@@ -256,7 +258,10 @@ impl GraphicsPipeline {
         let depth = vk::PipelineDepthStencilStateCreateInfo::default()
             .depth_test_enable(state.depth.is_some())
             .depth_write_enable(state.depth.is_some() && state.keeps != Keeps::ColorOver)
-            .depth_compare_op(vk::CompareOp::GREATER);
+            .depth_compare_op(match state.keeps {
+                Keeps::ColorOver => vk::CompareOp::GREATER_OR_EQUAL,
+                _ => vk::CompareOp::GREATER,
+            });
         let blend_attachments = [color_blend(state.keeps)];
         let blend = vk::PipelineColorBlendStateCreateInfo::default().attachments(&blend_attachments);
         let dynamic_states = [vk::DynamicState::VIEWPORT, vk::DynamicState::SCISSOR];
@@ -313,15 +318,16 @@ fn vertex_layout(
 fn color_blend(keeps: Keeps) -> vk::PipelineColorBlendAttachmentState {
     let operation = match keeps {
         Keeps::Largest => vk::BlendOp::MAX,
-        Keeps::Last | Keeps::Over | Keeps::ColorOver => vk::BlendOp::ADD,
+        Keeps::Last | Keeps::Depth | Keeps::Over | Keeps::ColorOver => vk::BlendOp::ADD,
     };
     let written = match keeps {
+        Keeps::Depth => vk::ColorComponentFlags::empty(),
         Keeps::ColorOver => vk::ColorComponentFlags::R | vk::ColorComponentFlags::G | vk::ColorComponentFlags::B,
         _ => vk::ColorComponentFlags::RGBA,
     };
     vk::PipelineColorBlendAttachmentState::default()
         .color_write_mask(written)
-        .blend_enable(keeps != Keeps::Last)
+        .blend_enable(!matches!(keeps, Keeps::Last | Keeps::Depth))
         .src_color_blend_factor(vk::BlendFactor::ONE)
         .dst_color_blend_factor(vk::BlendFactor::ONE_MINUS_SRC_ALPHA)
         .src_alpha_blend_factor(vk::BlendFactor::ONE)

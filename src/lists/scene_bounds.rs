@@ -77,6 +77,8 @@ pub struct EntityBounds {
     /// Centre of the bounding sphere in the world, metres.
     pub centre: DVec3,
     pub radius_m: f64,
+    /// Share of light that it reflects at most, of any colour.
+    pub reflectance: f64,
     /// Whether it casts shadows.
     pub occludes: bool,
     /// Whether it shines.

@@ -12,7 +12,6 @@ use crate::lists::scene_bounds::{ClusterBounds, EntityBounds, ListLight, SceneBo
 use crate::lists::skip::{CAP_SINES, SKIP_FADE_RAD};
 use crate::lists::tree::Crowd;
 use glam::{DVec2, DVec3};
-use std::f64::consts::PI;
 
 /// What an outline's distance may be off by, in r: more than the step of a map and what blending four of them errs by.
 const OUTLINE_MARGIN: f64 = 0.06;
@@ -136,7 +135,7 @@ pub struct Scope<'m> {
     index: usize,
     /// Entities whose shadows of sharp lights are in the cluster's maps.
     near: &'m [u32],
-    /// Albedo of the receiver, of its brightest colour.
+    /// Share of light that the receiver reflects at most.
     reflectance: f64,
     /// World, metres.
     centre: DVec3,
@@ -163,7 +162,7 @@ impl<'m> Scope<'m> {
             scene,
             index,
             near,
-            reflectance: PI * f64::from(receiver.albedo.into_iter().fold(0.0, f32::max)),
+            reflectance: scene.entities[index].reflectance,
             centre: vector([x, y, z]) + to_world(receiver, vector(bounds.centre) * scale),
             radius_m: f64::from(bounds.radius_m) * scale,
             axis: to_world(receiver, vector(bounds.axis)),
@@ -430,6 +429,7 @@ mod tests {
 
     #[test]
     fn angles_add_up_to_half_a_turn() {
+        use std::f64::consts::PI;
         let mut rng = fastrand::Rng::with_seed(6);
         for _ in 0..10_000 {
             let a = PI * rng.f64();

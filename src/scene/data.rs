@@ -422,8 +422,8 @@ pub struct EntityData {
     /// Textures of a glossy surface besides its albedo.
     #[serde(default, skip_serializing_if = "Maps::is_empty")]
     pub maps: Maps,
-    /// Share of light that does not pass, 0 to 1: less than 1 for glass and for what is blended with what lies behind
-    /// it. The default is 1.
+    /// Share of light that does not pass, 0 to 1, and a factor on the albedo: less than 1 for glass and for what is
+    /// blended with what lies behind it. The default is 1.
     #[serde(default = "values::one", deserialize_with = "values::share", skip_serializing_if = "is_opaque")]
     pub opacity: f32,
     /// Linear radiance in W m^-2 sr^-1, at most 1e15. It multiplies the colours of a mesh that has them. The default is

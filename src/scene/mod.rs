@@ -228,14 +228,29 @@ impl Scene {
         scene
     }
 
-    /// Cuts the holes of masked entities out of what casts their shadows. Of entities with one mesh the last decides.
+    /// Cuts the holes of masked entities out of what casts their shadows. Where entities of one mesh have other masks, or
+    /// none, the whole mesh casts them, each by its mean.
     fn cut_casters(&mut self) {
-        let masked =
-            (0..self.entities.len()).filter_map(|entity| Some((self.entities[entity].mesh, self.mask(entity)?)));
-        let masks: HashMap<usize, &Arc<Texture>> = masked.collect();
-        let cut =
-            |(mesh, texture): (usize, &Arc<Texture>)| Some((mesh, Arc::new(pierced(&self.meshes[mesh], texture)?)));
+        let mut masks: HashMap<usize, Vec<Option<usize>>> = HashMap::new();
+        for (index, entity) in self.entities.iter().enumerate() {
+            masks.entry(entity.mesh).or_default().push(entity.texture.filter(|_| self.mask(index).is_some()));
+        }
+        let cut = |(mesh, textures): (usize, Vec<Option<usize>>)| {
+            let texture = textures[0].filter(|_| textures.iter().all(|texture| *texture == textures[0]))?;
+            Some((mesh, Arc::new(pierced(&self.meshes[mesh], &self.textures[texture])?)))
+        };
         self.casters = masks.into_iter().filter_map(cut).collect();
+        for index in 0..self.entities.len() {
+            let Some(opacity) = self.mask(index).map(|mask| mask.mean_opacity(&self.meshes[self.entities[index].mesh]))
+            else {
+                continue;
+            };
+            let is_cut = self.casters.contains_key(&self.entities[index].mesh);
+            let own = self.opacity(index);
+            let entity = &mut self.entities[index];
+            entity.opacity = own * if is_cut { 1.0 } else { opacity };
+            entity.occludes &= opacity > 0.0;
+        }
     }
 
     /// The mesh that casts the shadows of entities of a mesh: itself, or what a texture leaves of it.
@@ -302,7 +317,7 @@ impl Scene {
         let Entity { mesh, albedo: mean, .. } = self.entities[entity];
         // What passes is not reflected: the mean of what blends is over the whole surface.
         let alpha = if texture.alpha_blend { texture.opacity_at(&self.meshes[mesh], corners, weights) } else { 1.0 };
-        let found = alpha * texture.at(&self.meshes[mesh], corners, weights);
+        let found = self.opacity(entity) * alpha * texture.at(&self.meshes[mesh], corners, weights);
         Vec3::from_array(std::array::from_fn(|c| if mean[c] > 0.0 { found[c] / mean[c] } else { 0.0 }))
     }
 
@@ -376,7 +391,8 @@ impl Scene {
     /// As [`Scene::set_entity`], of numbers in range.
     pub(crate) fn put_entity(&mut self, index: usize, data: EntityData) {
         let before = &self.data.entities[index];
-        let is_repainted = before.albedo != data.albedo;
+        let opacity = before.opacity;
+        let is_repainted = before.albedo != data.albedo || opacity != data.opacity;
         if (before.position, before.rotation, before.scale) != (data.position, data.rotation, data.scale) {
             self.loosen(index);
         }
@@ -385,6 +401,7 @@ impl Scene {
             Paint::new(&data.albedo, &self.data, &self.textures, &self.meshes[mesh])
         } else {
             let &Entity { texture, albedo, .. } = &self.entities[index];
+            let albedo = albedo / opacity.max(f32::MIN_POSITIVE);
             Paint {
                 texture,
                 mean: albedo,
@@ -394,7 +411,7 @@ impl Scene {
         let coat = Coat::new(&data, &self.data, &self.textures, &self.meshes[mesh]);
         self.entities[index] = resolve(index, &data, mesh, paint, coat, &self.textures);
         self.data.entities[index] = data;
-        if is_repainted {
+        if is_repainted || self.mask(index).is_some() {
             self.cut_casters();
         }
     }
@@ -528,7 +545,7 @@ fn resolve(
     Entity {
         name: data.name.clone().unwrap_or_else(|| format!("entity {index}")),
         mesh,
-        albedo: paint.mean,
+        albedo: data.opacity * paint.mean,
         texture: paint.texture,
         gloss: coat.gloss,
         maps: coat.maps,

@@ -163,7 +163,8 @@ pub fn picture(
                 of_pixel[3] += error * error;
             }
             radiance += free * background;
-            of_pixel[0] += radiance.min(DVec3::splat(white));
+            // As drawing brings it down, hue kept.
+            of_pixel[0] += radiance * (white / radiance.max_element().max(white));
             of_pixel[1] += radiance;
         }
         of_pixel.map(|value| value / places.len() as f64)

@@ -172,12 +172,14 @@ impl<'s> World<'s> {
         let direction = direction.as_vec3a();
         let placed = &self.entities[sight.entity];
         let limit = (limit_m / placed.radius_m) as f32;
+        if self.lets_through(sight.entity, direction) {
+            return false;
+        }
         if self.scene.mask(sight.entity).is_some() {
             let met = self.corners_hit(sight.entity, sight.origin, sight.to_object * direction);
             return met.is_some_and(|(distance, ..)| distance < limit);
         }
-        !self.lets_through(sight.entity, direction)
-            && sight.entry(direction, 1.0).is_some_and(|sphere| sphere < limit)
+        sight.entry(direction, 1.0).is_some_and(|sphere| sphere < limit)
             && (sight.entry(direction, placed.mesh.inner_radius).is_some_and(|inner| inner > 0.0 && inner < limit)
                 || placed.mesh.blocks(sight.origin, sight.to_object * direction, limit))
     }
@@ -189,11 +191,14 @@ impl<'s> World<'s> {
             let local = own.to_object * direction.as_vec3a();
             let limit = (limit_m / placed.radius_m) as f32;
             let entity = &self.scene.entities[own.entity];
+            if entity.transparent {
+                return false;
+            }
             match self.scene.mask(own.entity) {
                 Some(_) => {
                     self.corners_hit(own.entity, own.origin, local).is_some_and(|(distance, ..)| distance < limit)
                 }
-                None => !entity.transparent && placed.mesh.blocks(own.origin, local, limit),
+                None => placed.mesh.blocks(own.origin, local, limit),
             }
         })
     }

@@ -170,6 +170,7 @@ fn equal_keys_go_by_index() {
         sharp: false,
         centre: DVec3::new(x, 2.0, 3.0),
         radius_m: 0.5,
+        reflectance: 0.7,
         occludes: true,
         emits: false,
         coloured: false,

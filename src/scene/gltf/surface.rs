@@ -91,11 +91,17 @@ impl Surface {
             return Err(document.fail(place, "its base colour is negative or not finite"));
         }
         let albedo = albedo.min(Vec3::ONE);
-        let (opacity, albedo) = passing(json, alpha, albedo);
+        let metal = json.pbr_metallic_roughness.metallic_roughness_texture.as_ref();
+        let metal = metal.map(|info| textures.applied(info, shape, notes)).transpose()?.flatten();
+        let metal = metal.map_or(1.0, |applied| applied.texels.mean_bytes()[2]);
+        let (opacity, albedo) = passing(json, alpha, metal, albedo);
         let info = json.pbr_metallic_roughness.base_color_texture.as_ref();
         let applied = info.map(|info| textures.applied(info, shape, notes)).transpose()?.flatten();
         let alpha_cutoff = match json.alpha_mode {
-            Checked::Valid(AlphaMode::Mask) => Some(json.alpha_cutoff.map_or(0.5, |cutoff| cutoff.0.clamp(0.0, 1.0))),
+            // The factor's alpha is another factor of what is compared.
+            Checked::Valid(AlphaMode::Mask) => {
+                Some((json.alpha_cutoff.map_or(0.5, |cutoff| cutoff.0) / alpha.max(1e-6)).clamp(0.0, 1.0))
+            }
             _ => None,
         };
         let alpha_blend = matches!(json.alpha_mode, Checked::Valid(AlphaMode::Blend));
@@ -144,7 +150,7 @@ impl Surface {
 }
 
 /// The share of light that a material keeps back, and its base colour less what passes in place of being reflected.
-fn passing(json: &Material, alpha: f32, albedo: Vec3) -> (f32, Vec3) {
+fn passing(json: &Material, alpha: f32, metal: f32, albedo: Vec3) -> (f32, Vec3) {
     let alpha = match json.alpha_mode {
         Checked::Valid(AlphaMode::Blend) => alpha.clamp(0.0, 1.0),
         _ => 1.0,
@@ -152,9 +158,10 @@ fn passing(json: &Material, alpha: f32, albedo: Vec3) -> (f32, Vec3) {
     let transmission = json.extensions.as_ref().and_then(|e| e.transmission.as_ref());
     let transmission = transmission.map_or(0.0, |t| t.transmission_factor.0.clamp(0.0, 1.0));
     // A metal lets nothing through.
-    let passes = transmission * (1.0 - json.pbr_metallic_roughness.metallic_factor.0.clamp(0.0, 1.0));
-    let luminance = albedo.dot(Vec3::new(0.2126, 0.7152, 0.0722));
-    (alpha * (1.0 - passes * luminance), alpha * (1.0 - passes) * albedo)
+    let passes = transmission * (1.0 - metal * json.pbr_metallic_roughness.metallic_factor.0.clamp(0.0, 1.0));
+    let kept = 1.0 - passes * albedo.dot(Vec3::new(0.2126, 0.7152, 0.0722));
+    // An entity's opacity counts in what it reflects too.
+    (alpha * kept, if kept > 0.0 { ((1.0 - passes) / kept * albedo).min(Vec3::ONE) } else { Vec3::ZERO })
 }
 
 /// Metallic-roughness reflection; a texture that is no map counts by its mean.

@@ -10,12 +10,13 @@ mod stage;
 mod window;
 
 use room::apart;
+use shadow_fields::bake;
 use shadow_fields::draw::Antialias;
 use shadow_fields::error::Error;
 use shadow_fields::scene::{Lights, Scene};
-use shadow_fields::view::Setup;
 use shadow_fields::view::command::Command;
 use shadow_fields::view::input::{Button, Event, Key};
+use shadow_fields::view::{Previewed, Setup};
 use std::collections::HashSet;
 use std::path::Path;
 use std::time::Duration;
@@ -112,6 +113,21 @@ fn a_bake_shows_the_scene_without_shadows() {
     assert!(stand.viewer.frame().is_some() || apart(&shown, &stand.shown()) > 20, "a turn is not seen");
     stand.ready();
     as_rendered(&mut stand, "with its shadows");
+}
+
+/// Light on coarse surfaces of the scene as it stands comes before the fields of what moves are baked.
+#[test]
+fn a_bake_shows_its_light_before_it_ends() {
+    let finer = |setup: &mut Setup| setup.frame.bake = bake::Options { groups: true, ..bake::Options::default() };
+    let Some(mut stand) = Stand::with("lit", finer) else { return };
+    stand.until("light", |viewer| viewer.previewed() == Previewed::Light || viewer.frame().is_some());
+    assert!(stand.viewer.frame().is_none() && stand.viewer.is_baking(), "the whole was baked before");
+    let first = stand.shown();
+    stand.ready();
+    let whole = stand.shown();
+    let off: u64 = first.iter().flatten().zip(whole.iter().flatten()).map(|(a, b)| u64::from(a.abs_diff(*b))).sum();
+    let mean = off as f64 / (4 * whole.len()) as f64;
+    assert!(mean < 6.0, "{mean} of 255 in the mean");
 }
 
 #[test]

@@ -113,6 +113,15 @@ impl DrawGrid {
         DrawGrid { maker, made: Default::default() }
     }
 
+    pub fn make_those_of(&self, other: &DrawGrid) -> Result<()> {
+        for (made, sharp) in other.made.iter().zip([None, self.maker.sharp.as_ref()]) {
+            if made.get().is_some() {
+                self.pipeline(sharp)?;
+            }
+        }
+        Ok(())
+    }
+
     fn pipeline(&self, sharp: Option<&SharpPermutation>) -> Result<&GraphicsPipeline> {
         let PipelineMaker { state, display, .. } = self.maker;
         let vertex = ShaderPermutation::new("grid.vert", 4);

@@ -285,6 +285,12 @@ impl Draw {
         })
     }
 
+    /// Makes the pipelines that another of the same scene has drawn with, so that shaders that fail do so now.
+    pub fn make_those_of(&self, other: &Draw) -> Result<()> {
+        self.triangles.make_those_of(&other.triangles)?;
+        self.grid.make_those_of(&other.grid)
+    }
+
     /// Device memory of a pixel in the images of [`Draw::new`], bytes, as [`Draw::size_bytes`] counts it.
     pub fn pixel_bytes(device: &Device, antialias: Antialias, finish: Finish) -> u64 {
         let samples = u64::from(antialias.samples(device));

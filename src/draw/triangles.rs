@@ -221,6 +221,21 @@ impl DrawTriangles {
         DrawTriangles { maker, highlights, made: Default::default() }
     }
 
+    pub fn make_those_of(&self, other: &DrawTriangles) -> Result<()> {
+        let highlights = self.highlights.as_ref();
+        let glossy =
+            [Detail::Rough, Detail::Mirror, Detail::Textured].map(|detail| Look::Glossy { highlights, detail });
+        for look in [Look::Plain, Look::Painted].into_iter().chain(glossy) {
+            let forms = [false, true].into_iter().flat_map(|culls| {
+                [Form::Vertices { culls }, Form::OverDepth { culls }, Form::Over { culls }, Form::Pixels { culls }]
+            });
+            for form in forms.filter(|form| other.made[look.number()][form.number()].get().is_some()) {
+                self.pipeline(look, form)?;
+            }
+        }
+        Ok(())
+    }
+
     fn pipeline(&self, look: Look<'_>, form: Form) -> Result<&GraphicsPipeline> {
         let PipelineMaker { state, display, sharp, .. } = &self.maker;
         made_once(&self.made[look.number()][form.number()], || match form {

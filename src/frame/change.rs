@@ -97,7 +97,11 @@ impl Frame {
             "smooth.frag",
         ];
         if drawing.into_iter().any(uses) {
-            self.set_pictures(self.options, self.picture.draw.finish())?;
+            let before = self.set_pictures(self.options, self.picture.draw.finish())?;
+            if let Err(error) = self.picture.draw.make_those_of(&before) {
+                self.picture.draw = before;
+                return Err(error);
+            }
         }
         if uses("gloss.comp")
             && let Some(reflections) = &mut self.reflections

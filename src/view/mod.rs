@@ -54,4 +54,4 @@ pub use input::{Event, Input};
 #[cfg(feature = "view")]
 pub use picture::FrameTarget;
 #[cfg(feature = "view")]
-pub use viewer::{Setup, Viewer};
+pub use viewer::{Previewed, Setup, Viewer};

@@ -144,14 +144,14 @@ pub fn header(mesh: &Mesh, kind: FieldKind, options: &Options) -> FieldHeader {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
 pub enum Quality {
-    /// A tenth of the time and a seventh of the bytes; light in bands has 1.2 to 1.7 times the error: cube:8x3,edges=auto, 32 px,
-    /// 3 bands
+    /// A tenth of the time and a seventh of the bytes; light in bands has 1.2 to 1.7 times the error:
+    /// cube:8x3,edges=auto, 32 px, 3 bands
     Draft,
     /// The default: cube:20x7,edges=auto, 64 px, 4 bands
     #[default]
     Normal,
-    /// 5 times the time and 4 times the bytes; light in bands has 0.54 to 0.84 of the error: cube:24x9,edges=auto, 128 px, 5
-    /// bands
+    /// 5 times the time and 4 times the bytes; light in bands has 0.54 to 0.84 of the error:
+    /// cube:24x9,edges=auto, 128 px, 5 bands
     High,
 }
 

@@ -33,7 +33,8 @@ impl std::str::FromStr for Lattice {
     fn from_str(text: &str) -> std::result::Result<Self, String> {
         let explain = || {
             format!(
-                "cannot read lattice \"{text}\": expected cube:20x7, then any of ,inner=R ,outer=R ,edges ,edges=auto ,round"
+                "cannot read lattice \"{text}\": expected cube:20x7, then any of ,inner=R ,outer=R ,edges ,edges=auto \
+                 ,round"
             )
         };
         let mut words = text.split(',');

@@ -4,7 +4,7 @@
 //!
 //! | quality | lattice | face | bands | format |
 //! |---|---|---|---|---|
-//! | draft | cube:8x3,edges=auto | 32 px | 3 | f16 |
+//! | draft | cube:8x5,edges=auto | 32 px | 3 | f16 |
 //! | normal | cube:20x7,edges=auto | 64 px | 4 | f16 |
 //! | high | cube:24x9,edges=auto | 128 px | 5 | f16 |
 //!
@@ -144,13 +144,13 @@ pub fn header(mesh: &Mesh, kind: FieldKind, options: &Options) -> FieldHeader {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
 pub enum Quality {
-    /// A tenth of the time and a seventh of the bytes; light in bands has 1.2 to 1.7 times the error:
-    /// cube:8x3,edges=auto, 32 px, 3 bands
+    /// A sixth of the time and of the bytes; light in bands has 1.2 to 1.6 times the error: cube:8x5,edges=auto, 32 px,
+    /// 3 bands
     Draft,
     /// The default: cube:20x7,edges=auto, 64 px, 4 bands
     #[default]
     Normal,
-    /// 5 times the time and 4 times the bytes; light in bands has 0.54 to 0.84 of the error:
+    /// 4.4 times the time and 3 times the bytes; light in bands has 0.54 to 0.81 of the error:
     /// cube:24x9,edges=auto, 128 px, 5 bands
     High,
 }
@@ -162,7 +162,7 @@ impl Quality {
         let lattice = |text: &str| text.parse().expect("a lattice of the table");
         match self {
             Quality::Draft => Options {
-                lattice: lattice("cube:8x3,edges=auto"),
+                lattice: lattice("cube:8x5,edges=auto"),
                 face_px: 32,
                 bands: 3,
                 silhouette: silhouettes(4),

@@ -241,15 +241,10 @@ impl Scene {
         };
         self.casters = masks.into_iter().filter_map(cut).collect();
         for index in 0..self.entities.len() {
-            let Some(opacity) = self.mask(index).map(|mask| mask.mean_opacity(&self.meshes[self.entities[index].mesh]))
-            else {
-                continue;
-            };
-            let is_cut = self.casters.contains_key(&self.entities[index].mesh);
-            let own = self.opacity(index);
-            let entity = &mut self.entities[index];
-            entity.opacity = own * if is_cut { 1.0 } else { opacity };
-            entity.occludes &= opacity > 0.0;
+            let mesh = self.entities[index].mesh;
+            let Some(mask) = self.mask(index) else { continue };
+            let share = if self.casters.contains_key(&mesh) { 1.0 } else { mask.mean_opacity(&self.meshes[mesh]) };
+            self.entities[index].opacity = self.opacity(index) * share;
         }
     }
 
@@ -392,7 +387,7 @@ impl Scene {
     pub(crate) fn put_entity(&mut self, index: usize, data: EntityData) {
         let before = &self.data.entities[index];
         let opacity = before.opacity;
-        let is_repainted = before.albedo != data.albedo || opacity != data.opacity;
+        let is_repainted = before.albedo != data.albedo || opacity != data.opacity || opacity == 0.0;
         if (before.position, before.rotation, before.scale) != (data.position, data.rotation, data.scale) {
             self.loosen(index);
         }
@@ -400,18 +395,13 @@ impl Scene {
         let paint = if is_repainted {
             Paint::new(&data.albedo, &self.data, &self.textures, &self.meshes[mesh])
         } else {
-            let &Entity { texture, albedo, .. } = &self.entities[index];
-            let albedo = albedo / opacity.max(f32::MIN_POSITIVE);
-            Paint {
-                texture,
-                mean: albedo,
-                opacity: texture.map_or(1.0, |t| self.textures[t].mean_opacity(&self.meshes[mesh])),
-            }
+            let &Entity { texture, albedo, opacity: whole, .. } = &self.entities[index];
+            Paint { texture, mean: albedo / opacity, opacity: whole / opacity }
         };
         let coat = Coat::new(&data, &self.data, &self.textures, &self.meshes[mesh]);
         self.entities[index] = resolve(index, &data, mesh, paint, coat, &self.textures);
         self.data.entities[index] = data;
-        if is_repainted || self.mask(index).is_some() {
+        if is_repainted {
             self.cut_casters();
         }
     }
@@ -554,7 +544,8 @@ fn resolve(
         emission: data.emission,
         spot: data.spot,
         emits,
-        occludes: data.occludes.unwrap_or(!emits),
+        // A mask may leave nothing of it.
+        occludes: data.occludes.unwrap_or(!emits) && paint.opacity > 0.0,
         receives: data.receives.unwrap_or(true),
     }
 }

@@ -1,5 +1,6 @@
 #version 460
-// Adds to the direct light of every vertex what reaches it from the surfaces of its rigid group: src/bounce.rs.
+// Adds to the direct light of every vertex what reaches it from the surfaces of its rigid group, and from
+// others: src/bounce/mod.rs.
 #include "generated/structs.glsl"
 layout(local_size_x = 64) in;
 
@@ -15,7 +16,11 @@ layout(std430, binding = 5) writeonly buffer Radiosity { vec4 radiosity[]; };
 layout(std430, binding = 6) readonly buffer SoftDirect { vec4 soft_direct[]; };
 layout(std430, binding = 7) writeonly buffer Soft { vec4 soft[]; };
 #endif
-layout(push_constant) uniform Push { uint count; uint last; } push;
+#if MOVERS
+// Of other groups: share of the view times radiosity, and the share that they take.
+layout(std430, binding = 8) readonly buffer Incoming { vec4 incoming[]; };
+#endif
+layout(push_constant) uniform Push { uint count; uint last; uint meets; } push;
 
 void main() {
     uint i = gl_GlobalInvocationID.x;
@@ -29,7 +34,13 @@ void main() {
         uint packed = link_at(k);
         sum += float(packed >> RUN_BITS) * run_light_at(packed & ((1u << RUN_BITS) - 1)).rgb;
     }
-    vec4 bounced = vec4(PI * entities[range.y >> 8].albedo * sum / WHOLE_SHARE, 0.0); // albedo is over pi
+    sum /= WHOLE_SHARE;
+#if MOVERS
+    if (push.meets != 0) {
+        sum = sum * (1.0 - incoming[i].w) + incoming[i].rgb;
+    }
+#endif
+    vec4 bounced = vec4(PI * entities[range.y >> 8].albedo * sum, 0.0); // albedo is over pi
     radiosity[i] = direct[i] + bounced;
 #if SOFT
     if (push.last != 0) {

@@ -18,8 +18,8 @@ mat3 self_frame(vec3 normal) {
 vec2 self_place(vec3 local) {
     vec2 flattened = local.xy / max(abs(local.x) + abs(local.y) + max(local.z, 0.0), 1e-20);
     vec2 square = vec2(flattened.x + flattened.y, flattened.x - flattened.y) * (1.0 / SELF_RIM);
-    const float HALF = 0.5 * float(SELF_SIDE - 1);
-    return clamp(square, -1.0, 1.0) * HALF + HALF;
+    const float MIDDLE = 0.5 * float(SELF_SIDE - 1);
+    return clamp(square, -1.0, 1.0) * MIDDLE + MIDDLE;
 }
 
 // At a direction (any length, in the frame's own frame): signed angle in radians to the edge of what the vertex sees,

@@ -9,7 +9,8 @@ use shadow_fields::bake::project::Project;
 use shadow_fields::bake::raster::Raster;
 use shadow_fields::bake::silhouette::{Silhouette, SilhouetteOptions};
 use shadow_fields::bench::shadow_map::{Filter, ShadowMaps};
-use shadow_fields::bounce::{bounce_row, moved_row, runs_row};
+use shadow_fields::bounce::movers::{movers_row, outgoing_row};
+use shadow_fields::bounce::{bounce_row, runs_row};
 use shadow_fields::draw::grid::DrawGrid;
 use shadow_fields::draw::smooth::Smooth;
 use shadow_fields::draw::triangles::{Detail, DrawTriangles, Look};
@@ -36,14 +37,20 @@ fn bouncing() -> Vec<ShaderPermutation> {
     let rows = |texels| {
         [
             runs_row(texels),
-            bounce_row(texels, false),
-            bounce_row(texels, true),
-            moved_row(texels, false),
-            moved_row(texels, true),
+            bounce_row(texels, false, true),
+            bounce_row(texels, true, false),
+            bounce_row(texels, true, true),
             gloss_row(texels),
         ]
     };
-    [false, true].into_iter().flat_map(rows).collect()
+    let usual = usual_permutation();
+    let of_movers = |variant: &Variant| {
+        let merge = MergePermutation { variant: *variant, ..usual };
+        [outgoing_row(&merge), movers_row(&merge, false), movers_row(&merge, true)]
+    };
+    let few = MergePermutation { bands: 2, field_bands: 3, ..usual };
+    let movers = VARIANTS.iter().flat_map(of_movers).chain([movers_row(&few, true)]);
+    [false, true].into_iter().flat_map(rows).chain(movers).collect()
 }
 
 /// Every way of the pass of sharp lights.

@@ -238,7 +238,7 @@ impl<'a> Rendering<'a> {
         RayCast {
             rays: self.arguments.rays(),
             seed: self.global.seed,
-            bounces: self.options.bounces.steps(),
+            bounces: self.options.bounces.most(),
             single_scatter: self.options.single_scatter,
             ..Default::default()
         }

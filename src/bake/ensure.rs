@@ -139,9 +139,9 @@ pub struct Needed {
 
 /// What the entities of a mesh need. An entity that only receives, or that nothing else can see, needs no field, and an
 /// occluder that is a rectangle none either.
-/// Without light no shadows are needed, without light in spherical harmonics no occlusion field, without sharp lights
-/// no silhouettes. A light of one colour needs no radiance field. What only members of its own group see of an occluder
-/// is in their own visibility, less the shadows of sharp lights.
+/// Without light no shadows are needed, without light in spherical harmonics occlusion fields of what moves alone,
+/// without sharp lights no silhouettes. A light of one colour needs no radiance field. What only members of its own group
+/// see of an occluder is in their own visibility, less the shadows of sharp lights.
 pub fn needs(scene: &Scene, mesh: usize, lights: Lights, groups: &Groups) -> Needed {
     let entities = || (0..scene.entities.len()).filter(|&i| scene.entities[i].mesh == mesh);
     let seen = || entities().filter(|&e| groups.is_seen(e));
@@ -152,7 +152,9 @@ pub fn needs(scene: &Scene, mesh: usize, lights: Lights, groups: &Groups) -> Nee
     let sharp = light::has_sharp(scene, lights);
     let shines = |wanted: LightMethod| seen().any(|e| scene.entities[e].emits && method(e) == wanted);
     let casts = scene.caster(mesh).rectangle().is_none();
-    let blocked = (casts && harmonics && seen_by_others().any(|e| scene.entities[e].occludes))
+    // Light bounces from what moves by its occlusion field.
+    let wanted = |e: usize| harmonics || (sharp && !scene.is_at_rest(e));
+    let blocked = (casts && seen_by_others().any(|e| scene.entities[e].occludes && wanted(e)))
         || (shines(LightMethod::Harmonics) && !coloured);
     let radiance = coloured && shines(LightMethod::Harmonics);
     Needed {

@@ -7,6 +7,8 @@
 //! larger ones, and all that light from a far wall takes is one link (Hanrahan, Salzman, Aupperle, *A Rapid Hierarchical
 //! Radiosity Algorithm*, 1991). The sum of a vertex's links is the share of the hemisphere that shows fronts of the group.
 
+use std::ops::Range;
+
 /// Vertices of a run, in the order of clusters: the smallest runs, clusters, and groups of those.
 pub const RUNS: [usize; 3] = [8, 64, 512];
 /// A run with a smaller share of the hemisphere becomes part of a larger one.
@@ -54,6 +56,16 @@ impl Runs {
             let runs = (0..vertices).step_by(RUNS[size]);
             (firsts[size]..).zip(runs.map(move |first| (member, first, RUNS[size].min(vertices - first))))
         })
+    }
+
+    /// Numbers of the next smaller runs that a run consists of.
+    pub fn parts(&self, number: u32) -> Range<u32> {
+        let member = self.firsts.partition_point(|firsts| firsts[0] <= number) - 1;
+        let firsts = self.firsts[member];
+        let Some(size) = (1..RUNS.len()).rfind(|&size| firsts[size] <= number) else { return 0..0 };
+        let ratio = (RUNS[size] / RUNS[size - 1]) as u32;
+        let first = firsts[size - 1] + (number - firsts[size]) * ratio;
+        first..(first + ratio).min(firsts[size])
     }
 
     /// Member, first vertex in the order of clusters, and number of vertices of every run.
@@ -144,6 +156,13 @@ mod tests {
         let sized: Vec<_> = (0..RUNS.len()).flat_map(|size| runs.of_size(size).collect::<Vec<_>>()).collect();
         assert_eq!(sized.len(), all.len());
         assert!(sized.iter().all(|(number, run)| all[*number as usize] == *run));
+        for (number, (member, first, count)) in (0..).zip(&all) {
+            let parts: Vec<_> = runs.parts(number).map(|part| all[part as usize]).collect();
+            let small = *first..first + RUNS[0].min(*count);
+            assert!(parts.is_empty() == (number < 125 || (143..152).contains(&number)), "{number} {small:?}");
+            assert!(parts.iter().all(|part| part.0 == *member && part.1 >= *first));
+            assert!(parts.is_empty() || parts.iter().map(|part| part.2).sum::<usize>() == *count);
+        }
         let mut rng = fastrand::Rng::with_seed(1);
         // A tenth of the rays meet one smallest run, a third one cluster, the others anything.
         let met: Vec<Met> = (0..600)

@@ -41,9 +41,16 @@ position = [0.3, 2.3, 0.4]
 emission = [9, 8, 7]
 "#;
 
+/// What lights it: a sharp lamp, past maps of self-visibility, or a sky, past transfers.
+const SKY: &str = "[environment]\nsky = { sun_elevation_deg = 50, sun_azimuth_deg = 60, radiance = 0.8, sun = 0 }\n";
+
 pub fn rows(baker: &Baker, add: &mut dyn FnMut(CheckRow)) -> Result<()> {
-    let scene = scene(CORNER)?;
-    for (what, bounces) in [("one bounce", Bounces::One), ("all bounces", Bounces::All)] {
+    let lamp = CORNER.to_owned();
+    let sky = format!("{}{SKY}", CORNER.replace("emission = [9, 8, 7]\n", ""));
+    let cases =
+        [("one bounce", Bounces::One, &lamp), ("all bounces", Bounces::All, &lamp), ("a sky", Bounces::All, &sky)];
+    for (what, bounces, text) in cases {
+        let scene = scene(text)?;
         let bake = crate::bake::Options { groups: true, ..options().bake };
         let options = frame::Options { bounces, bake, lights: Lights::Sharp, ..options() };
         let mut frame = Frame::new(baker, &Cache::default(), &scene, options, &|_, _, _| ())?;

@@ -1,7 +1,7 @@
 //! Changes between frames: the scene's lights and camera, the merge's variant, and shader files.
 
 use super::permutation::{CompiledMerge, harmonic_lights, usable};
-use super::{Frame, methods, permutation};
+use super::{Frame, albedos, methods, permutation};
 use crate::bake;
 use crate::error::Result;
 use crate::merge::calibrate;
@@ -38,6 +38,9 @@ impl Frame {
         let receivers = |scene: &Scene| scene.entities.iter().map(|e| (e.mesh, e.receives)).collect::<Vec<_>>();
         assert_eq!(receivers(scene), receivers(&self.scene), "another scene needs another frame");
         let sky = scene.data.environment != self.scene.data.environment;
+        if albedos(scene) != albedos(&self.scene) {
+            self.bounce.as_mut().map_or(Ok(()), |bounce| bounce.set_albedos(&albedos(scene)))?;
+        }
         let surfaces = (0..scene.entities.len()).map(|entity| self.scene.surface(entity).clone()).collect();
         self.scene = scene.clone();
         self.scene.set_surfaces(surfaces);

@@ -27,7 +27,7 @@ use crate::bake::cache::Cache;
 use crate::bake::ensure::SceneProgress;
 use crate::bake::surfaces::SurfacePlan;
 use crate::bake::{self, Baker, SceneNeeds};
-use crate::bounce::{Bounce, Bounces, Linked, LinkedEntity};
+use crate::bounce::{Bounce, BounceWork, Bounces, Linked, LinkedEntity};
 use crate::draw::{PictureLights, Shading};
 use crate::error::Result;
 use crate::gloss::Reflections;
@@ -63,6 +63,11 @@ pub use viewport::{RadiositySource, Viewport};
 /// How the light of each entity of a scene is computed.
 fn methods(scene: &Scene, lights: Lights) -> Vec<LightMethod> {
     (0..scene.entities.len()).map(|entity| LightMethod::of(scene, entity, lights)).collect()
+}
+
+/// Largest albedo of each entity, of any colour.
+fn albedos(scene: &Scene) -> Vec<f32> {
+    scene.entities.iter().map(|entity| entity.albedo.max_element()).collect()
 }
 
 /// A scene on a device, ready to be lit and drawn at any time.
@@ -152,13 +157,14 @@ impl Frame {
                 "no pixel evaluates lights: the device's texel buffers cannot hold the silhouette fields or the light of all vertices"
             );
         }
-        let texels = merge.permutation.variant.reads == Reads::Texels;
         let placements = scene.at(0.0);
         let linked = |(entity, links)| LinkedEntity {
             mesh: scene.surface(entity),
             order: &buffers.surface(entity).order,
             first: radiosity.offsets[entity] as usize / 16,
-            vertex_first: buffers.surface(entity).vertices.start as usize,
+            centre_m: buffers.meshes[scene.entities[entity].mesh].centre_m,
+            radius_m: buffers.meshes[scene.entities[entity].mesh].radius_m,
+            reflects: scene.entities[entity].occludes && buffers.shadows(&scene, entity),
             rests: scene.is_at_rest(entity),
             placement: placements[entity],
             receives: scene.entities[entity].receives,
@@ -168,8 +174,13 @@ impl Frame {
         let linked = bounces
             .then(|| links.into_iter().enumerate().map(linked).collect::<Vec<_>>())
             .and_then(|entities| Linked::new(&entities, &rigid));
-        let bounce = linked.map(|linked| Bounce::new(device, library, &linked, sharp.is_some(), texels)).transpose()?;
-        if bounce.is_some() {
+        let self_shadows = buffers.has_self_shadows();
+        let permutation = merge.permutation;
+        let mut bounce = linked
+            .map(|linked| Bounce::new(device, library, linked, sharp.is_some(), permutation, self_shadows))
+            .transpose()?;
+        if let Some(bounce) = &mut bounce {
+            bounce.set_albedos(&albedos(&scene))?;
             radiosity.keep_direct()?;
         }
         let edges = pixels.pixels().is_some();
@@ -273,15 +284,23 @@ impl Frame {
         }
         Ok(Some(MergeWork {
             cluster_count,
-            inputs: self.inputs()?,
+            inputs: self.inputs(&self.merge.permutation)?,
             merge: &self.merge.pass,
             sharp: self.sharp.as_ref().map(|sharp| (sharp, self.sharp_inputs())),
-            entities: &self.work.entities,
-            vertices: &self.buffers.vertices,
             soft: self.radiosity.soft_direct(),
             radiosity: self.radiosity.direct(),
-            bounce: self.bounce.as_ref().map(|bounce| (bounce, self.radiosity.bounced(), self.options.bounces.steps())),
+            bounce: self.bounce.as_ref().map(|bounce| Ok((bounce, self.bounce_work(bounce)?))).transpose()?,
         }))
+    }
+
+    fn bounce_work(&self, bounce: &Bounce) -> Result<BounceWork<'_>> {
+        let inputs = bounce.reads().map(|permutation| self.inputs(permutation)).transpose()?;
+        Ok(BounceWork {
+            entities: &self.work.entities,
+            light: self.radiosity.bounced(),
+            steps: bounce.steps(self.options.bounces),
+            met: inputs.map(|inputs| (inputs, self.buffers.has_self_shadows().then_some(&self.buffers.self_cells))),
+        })
     }
 
     fn sharp_inputs(&self) -> sharp::SharpInputs<'_> {
@@ -298,9 +317,8 @@ impl Frame {
         }
     }
 
-    fn inputs(&self) -> Result<MergeInputs<'_>> {
+    fn inputs(&self, permutation: &MergePermutation) -> Result<MergeInputs<'_>> {
         let floats = vk::Format::R32G32B32A32_SFLOAT;
-        let permutation = &self.merge.permutation;
         Ok(MergeInputs {
             entities: Readable::shared(&self.work.entities, permutation.variant)?,
             entries: Readable::new(&self.work.entries, permutation.variant, ENTRY_FORMAT)?,

@@ -5,7 +5,7 @@ use crate::draw::Shading;
 use crate::error::Result;
 use crate::field::silhouette::SilhouetteField;
 use crate::gpu::{Buffer, Device, TexelView};
-use crate::layout::{DeviceEntity, NONE};
+use crate::layout::DeviceEntity;
 use crate::merge::Merge;
 use crate::merge::variant::{MergePermutation, Variant};
 use crate::scene::{LightMethod, Scene};
@@ -81,7 +81,7 @@ pub(super) fn sharp(
         boxes: any_field(SilhouetteField::has_box),
         sheets: merge.sheets,
         gloss: merge.gloss,
-        self_shadows: buffers.surfaces.iter().any(|surface| surface.self_first != NONE),
+        self_shadows: buffers.has_self_shadows(),
         cones: lights.len() > 1,
         edges: false,
         rolled: false,

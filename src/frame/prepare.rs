@@ -118,6 +118,7 @@ impl Frame {
         if self.device.info.is_software() {
             limits::check_entries(clusters.iter().map(|cluster| cluster.entry_count).max().unwrap_or(0))?;
         }
+        self.bounce.as_mut().map_or(Ok(()), |bounce| bounce.prepare(&work.lists))?;
         work.entities.write(&work.lists.now().entities)?;
         work.entries.write(&entries)?;
         work.clusters.write(&clusters)

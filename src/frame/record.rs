@@ -4,7 +4,7 @@
 //! and in who waits: a file submits the recording and waits for its end, the window launches it and goes on to the next
 //! frame.
 
-use crate::bounce::{Bounce, BouncedLight};
+use crate::bounce::{Bounce, BounceWork};
 use crate::draw::smooth::Lines;
 use crate::draw::{Draw, DrawnViewport};
 use crate::error::Result;
@@ -19,16 +19,13 @@ pub struct MergeWork<'f> {
     pub(super) cluster_count: u32,
     pub(super) inputs: MergeInputs<'f>,
     pub(super) merge: &'f Merge,
-    pub(super) entities: &'f Buffer,
-    /// Positions and normals.
-    pub(super) vertices: &'f Buffer,
     /// The pass of sharp lights with what it reads; `None` where the scene has none.
     pub(super) sharp: Option<(&'f Sharp, sharp::SharpInputs<'f>)>,
     /// Output of the merge: all light, or the part to which the pass of sharp lights adds.
     pub(super) soft: &'f Buffer,
     pub(super) radiosity: &'f Buffer,
-    /// What adds bounces to the direct light of all vertices, and in how many steps.
-    pub(super) bounce: Option<(&'f Bounce, BouncedLight<'f>, u32)>,
+    /// What adds bounces to the direct light of all vertices.
+    pub(super) bounce: Option<(&'f Bounce, BounceWork<'f>)>,
 }
 
 pub struct PictureWork<'f> {
@@ -84,11 +81,11 @@ pub fn record<'f>(
             commands.barrier(Access::ComputeWrite, Access::ComputeSampled);
             commands.pass("sharp", |c| sharp.record(c, inputs, work.radiosity, work.cluster_count))?;
         }
-        if let Some((bounce, light, steps)) = &work.bounce {
+        if let Some((bounce, bounce_work)) = &work.bounce {
             // Direct light of every cluster, of this frame or an earlier one.
             commands.barrier(Access::ComputeWrite, Access::ComputeRead);
             commands.barrier(Access::ComputeWrite, Access::ComputeSampled);
-            commands.pass("bounce", |c| bounce.record(c, [work.entities, work.vertices], light, *steps))?;
+            commands.pass("bounce", |c| bounce.record(c, bounce_work))?;
         }
     }
     if merge.is_some() && commands.is_shared() {

@@ -1,11 +1,11 @@
 //! The CPU twin of a frame's merge, and what its lists leave off.
 
 use super::Frame;
-use crate::bounce::TwinInput;
+use crate::bounce::twin::{TwinInput, TwinVertex};
 use crate::error::Result;
-use crate::field::{Area, ShadowField};
+use crate::field::{Area, ShadowField, self_visibility};
 use crate::gpu::Buffer;
-use crate::layout::{CLUSTER_VERTICES, ENTRY_ENTITIES, ListEntry};
+use crate::layout::{CLUSTER_VERTICES, Cluster, ENTRY_ENTITIES, ListEntry};
 use crate::lists::gather::{self, Candidates, Counts};
 use crate::lists::incremental::{ClusterLists, State};
 use crate::lists::scope::Scope;
@@ -13,6 +13,7 @@ use crate::merge::twin::{MergeObject, MergeTwin};
 use crate::scene::{Entity, LightMethod, Placement, Scene};
 use crate::scene_buffers;
 use crate::scene_buffers::DeviceSurface;
+use crate::sh::basis::coefficient_count;
 use crate::sharp::twin::{SharpLight, SharpObject, SharpTwin, SurfacePoint};
 use glam::DVec3;
 use std::collections::{BTreeSet, HashSet};
@@ -119,9 +120,9 @@ struct Receiver {
 }
 
 impl FrameTwin<'_> {
-    /// Radiosity of every receiver's vertices, by entity, on all threads.
-    pub fn run(&self) -> Vec<(usize, Vec<[f64; 3]>)> {
-        let Frame { scene, buffers, options, .. } = self.frame;
+    /// Every entity as the merge sees it.
+    fn objects(&self) -> Vec<MergeObject<'_>> {
+        let Frame { scene, buffers, .. } = self.frame;
         let object = |(index, placement): (usize, &Placement)| {
             let entity = &scene.entities[index];
             let [blocked, radiance] = &self.fields[entity.mesh];
@@ -139,7 +140,17 @@ impl FrameTwin<'_> {
                 opacity: entity.opacity.into(),
             }
         };
-        let objects: Vec<MergeObject<'_>> = self.placements.iter().enumerate().map(object).collect();
+        self.placements.iter().enumerate().map(object).collect()
+    }
+
+    fn receiver(&self, index: usize) -> &Receiver {
+        self.receivers.iter().find(|receiver| receiver.index == index).expect("only receivers have clusters")
+    }
+
+    /// Radiosity of every receiver's vertices, by entity, on all threads.
+    pub fn run(&self) -> Vec<(usize, Vec<[f64; 3]>)> {
+        let Frame { scene, options, .. } = self.frame;
+        let objects = self.objects();
         let outlines: Vec<SharpObject<'_>> = objects.iter().enumerate().map(|o| self.outline(o)).collect();
         let lit = |receiver: &Receiver| {
             let leaves = |v: usize, j: usize, light: Option<usize>| {
@@ -240,17 +251,27 @@ impl Frame {
         let light = |buffer: &Buffer| -> Result<Vec<DVec3>> {
             Ok(buffer.download((buffer.size_bytes / 16) as usize)?.into_iter().map(vector).collect())
         };
-        let vertices: Vec<[f32; 4]> =
-            self.buffers.vertices.download((self.buffers.vertices.size_bytes / 16) as usize)?;
-        let vertex = |entity: usize, v: usize| {
-            let placement = &placements[entity];
-            let place = placement.turn() * (vector(vertices[2 * v]) * f64::from(placement.scale));
-            [self.centre(entity, placement) + place, placement.turn() * vector(vertices[2 * v + 1])]
+        let twin = self.frame_twin(placements)?;
+        let objects = twin.objects();
+        let vertex = |cluster: &Cluster, v: usize| {
+            let receiver = twin.receiver(cluster.receiver as usize);
+            let surface = self.buffers.surface(receiver.index);
+            let v = surface.order[cluster.vertex_first as usize - surface.vertices.start as usize + v] as usize;
+            let object = &objects[receiver.index];
+            let count = coefficient_count(self.options.bake.bands);
+            TwinVertex {
+                position: object.centre + object.rotation * (receiver.positions[v] * object.scale),
+                normal: receiver.normals[v],
+                transfer: receiver.transfer.as_ref().map(|(floats, stride)| &floats[v * stride..][..count]),
+                map: surface
+                    .self_maps
+                    .as_ref()
+                    .map(|maps| &maps[v * self_visibility::BYTES..][..self_visibility::BYTES]),
+            }
         };
-        let albedo: Vec<DVec3> = self.scene.entities.iter().map(|entity| entity.albedo.as_dvec3() / PI).collect();
         let direct = light(self.radiosity.direct())?;
-        let input = TwinInput { direct: &direct, albedo: &albedo, vertex: &vertex };
-        let wanted = bounce.twin(&input, self.options.bounces.steps())?;
+        let input = TwinInput { direct: &direct, objects: &objects, skip: self.options.skip, vertex: &vertex };
+        let wanted = bounce.twin(&input, bounce.steps(self.options.bounces))?;
         Ok(Some([light(&self.radiosity.merged)?, wanted]))
     }
 }

@@ -9,6 +9,7 @@
 //! seen, or once nothing moves any more.
 
 use crate::layout::{self, ListEntry, OWN_MAPS};
+use crate::lists::far::{Cut, FarRuns};
 use crate::lists::gather::{self, Candidates, ClusterBounds, Counts, GROUP_CLUSTERS, SceneBounds};
 use crate::lists::scope::Scope;
 use crate::lists::sight::{Sight, TriangleRun};
@@ -82,6 +83,21 @@ pub(crate) struct ClusterLists {
     /// Clusters that have changed since they were merged, and how many they are.
     stale: Vec<bool>,
     stale_count: usize,
+}
+
+/// Words before the runs of a list of [`ClusterLists::reflectors`].
+pub(crate) const CUT_HEADER: usize = 5;
+
+/// From which entities light bounces onto those of other groups.
+pub(crate) struct Reflectors<'r, I> {
+    /// Those that reflect.
+    pub movers: I,
+    /// Of every entity, whether it has a field by which others see it.
+    pub reflects: &'r [bool],
+    /// Whether it never moves.
+    pub rests: &'r [bool],
+    /// All that rests, as what moves sees it.
+    pub far: &'r FarRuns,
 }
 
 /// What a frame did about its clusters.
@@ -276,6 +292,64 @@ impl ClusterLists {
             all.extend(entries);
         }
         (clusters, all)
+    }
+
+    /// What light bounces from onto each cluster at the last update's time: clusters that know their place among the
+    /// entries, and the entries. A list begins with [`CUT_HEADER`] words: the middle of the cluster in the world,
+    /// from its entity's centre, and how many near and far runs of what rests it sees, if it moves. Those follow, and then
+    /// entities.
+    ///
+    /// The cuts of whole entities that move, of those in `of.movers`, come last: first entry and how many.
+    pub fn reflectors(
+        &self,
+        of: &Reflectors<'_, impl Iterator<Item = usize> + Clone + Sync>,
+    ) -> (Vec<layout::Cluster>, Vec<u32>, Vec<[u32; 2]>) {
+        let State { scene_bounds, entities, .. } = self.now();
+        let of_group = |group: &WatchedGroup| {
+            let receiver = group.receiver;
+            let entity = &entities[receiver];
+            let rests = of.rests[receiver];
+            let scope = Scope::new(scene_bounds, receiver, entity, &group.bounds, &[]);
+            let mut candidates = Vec::new();
+            let reflects = |j: u32| {
+                let index = j as usize;
+                let together = scene_bounds.groups.as_ref().is_some_and(|groups| groups.are_one(receiver, index));
+                of.reflects[index] && !together && index != receiver && (rests || !of.rests[index])
+            };
+            let keep = |j| candidates.extend(reflects(j).then_some(j));
+            scene_bounds.tree.find(|crowd| scope.leaves_dark(crowd), keep);
+            let of_cluster = |cluster: usize| {
+                let scope = Scope::new(scene_bounds, receiver, entity, &self.bounds[cluster], &[]);
+                let (centre, radius_m) = scope.sphere();
+                let cut = if rests { Cut::default() } else { of.far.cut(centre.as_vec3(), radius_m as f32) };
+                let [x, y, z] = (centre - scene_bounds.entities[receiver].centre).as_vec3().to_array();
+                let mut entries = vec![x.to_bits(), y.to_bits(), z.to_bits()];
+                entries.extend([cut.near.len(), cut.far.len()].map(|count| count as u32));
+                entries.extend(cut.near.iter().chain(&cut.far));
+                entries.extend(candidates.iter().copied().filter(|&j| scope.meets(j as usize)));
+                entries
+            };
+            group.clusters.clone().map(of_cluster).collect::<Vec<_>>()
+        };
+        let found: Vec<Vec<Vec<u32>>> = self.groups.par_iter().map(of_group).collect();
+        let mut clusters = self.clusters.clone();
+        let mut all = Vec::new();
+        for (cluster, entries) in clusters.iter_mut().zip(found.into_iter().flatten()) {
+            cluster.entry_first = all.len() as u32;
+            cluster.entry_count = entries.len() as u32;
+            all.extend(entries);
+        }
+        let cut = |entity: usize| {
+            let [x, y, z, radius_m] = scene_bounds.spheres[entity];
+            let first = all.len();
+            if !of.rests[entity] {
+                let Cut { near, far } = of.far.cut(Vec3::new(x, y, z), radius_m);
+                all.extend([near, far].concat());
+            }
+            [first, all.len() - first].map(|place| place as u32)
+        };
+        let cuts = of.movers.clone().map(cut).collect();
+        (clusters, all, cuts)
     }
 
     /// The chains of sharp lights of all clusters of a receiver at the last update's time, for what lies as far as

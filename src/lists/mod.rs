@@ -1,5 +1,6 @@
 //! Cluster lists: which entities concern which cluster of 64 vertices, and which clusters have to be merged again.
 
+pub mod far;
 pub mod gather;
 pub mod incremental;
 pub mod scene_bounds;

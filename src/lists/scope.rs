@@ -16,6 +16,9 @@ use glam::{DVec2, DVec3};
 /// What an outline's distance may be off by, in r: more than the step of a map and what blending four of them errs by.
 const OUTLINE_MARGIN: f64 = 0.06;
 
+/// Share of a vertex's view, times its albedo, below which the light that an entity reflects is left out.
+const LEAST_TAKEN: f64 = 1.0 / 96.0;
+
 /// What becomes of an entity in a chain.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum CullResult {
@@ -174,6 +177,11 @@ impl<'m> Scope<'m> {
     /// What the rule looks at.
     pub fn scene(&self) -> &'m SceneBounds {
         self.scene
+    }
+
+    /// The sphere around its vertices: centre in the world, radius, metres.
+    pub fn sphere(&self) -> (DVec3, f64) {
+        (self.centre, self.radius_m)
     }
 
     /// Whether the own visibility of the cluster has the shadows of an occluder, those of sharp lights or all others.
@@ -361,6 +369,22 @@ impl<'m> Scope<'m> {
     /// Whether no member of a crowd matters to any cluster within the bounds: their weight under the brightest light is
     /// negligible.
     pub fn leaves_out(&self, crowd: &Crowd) -> bool {
+        self.of_weight(self.crowd_weight(crowd) * f64::from(self.scene.brightest)) != CullResult::Listed
+    }
+
+    /// The same for light that its members reflect: each takes less of the view than counts.
+    pub fn leaves_dark(&self, crowd: &Crowd) -> bool {
+        self.reflectance * self.crowd_weight(crowd) < LEAST_TAKEN
+    }
+
+    /// Whether light that an entity reflects counts at any vertex of the cluster.
+    pub fn meets(&self, index: usize) -> bool {
+        let view = self.view_of(index);
+        !view.below && self.reflectance * view.weight >= LEAST_TAKEN
+    }
+
+    /// A bound of the weight of every member at every cluster within the bounds.
+    fn crowd_weight(&self, crowd: &Crowd) -> f64 {
         let [x, y, z] = crowd.centre.map(f64::from);
         let reach = f64::from(crowd.reach_m);
         let largest = f64::from(crowd.radius_m);
@@ -368,7 +392,7 @@ impl<'m> Scope<'m> {
         let distance = to.length().max(1e-15);
         let blur = self.radius_m + reach;
         let nearest = distance - blur;
-        let weight = if nearest > largest.max(self.radius_m) {
+        if nearest > largest.max(self.radius_m) {
             // Directions differ by at most asin(blur / distance) between member and crowd; a cluster adds its own turn.
             let turn = Angle::of_sine(self.radius_m / nearest).plus(Angle::of_sine(blur / distance));
             let half = Angle::of_sine(largest / nearest);
@@ -376,8 +400,7 @@ impl<'m> Scope<'m> {
             weight(half, from_axis.cosine_less(self.spread.plus(half.plus(turn))))
         } else {
             EVERYTHING
-        };
-        self.of_weight(weight * f64::from(self.scene.brightest)) != CullResult::Listed
+        }
     }
 
     /// Whether an entity may stand on the list of any cluster within the bounds.

@@ -40,7 +40,7 @@ impl<'b> Readable<'b> {
         }))
     }
 
-    fn bind(&self) -> Bind<'b> {
+    pub fn bind(&self) -> Bind<'b> {
         self.0.clone()
     }
 }

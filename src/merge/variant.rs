@@ -123,20 +123,29 @@ impl MergePermutation {
         }
     }
 
-    fn packed(&self) -> bool {
+    pub fn reads_texels(&self) -> bool {
         self.variant.reads == Reads::Texels
+    }
+
+    fn packed(&self) -> bool {
+        self.reads_texels()
             && self.storage == Storage::F16
             && [self.bands, self.field_bands].iter().all(|&bands| channel_stride(bands).is_multiple_of(8))
     }
 
     pub fn row(&self) -> ShaderPermutation {
+        self.row_of("merge.comp")
+    }
+
+    /// The same macros for another shader that reads fields.
+    pub fn row_of(&self, file: &'static str) -> ShaderPermutation {
         let lattice = self.lattice;
-        let row = ShaderPermutation::new("merge.comp", self.bands)
+        let row = ShaderPermutation::new(file, self.bands)
             .field_bands(self.field_bands)
             .number("Y00", Y00)
             .define("WORKGROUP", CLUSTER_VERTICES)
             .define("ENTRY_BITS", ENTRY_BITS)
-            .define("TEXEL", self.variant.reads == Reads::Texels)
+            .define("TEXEL", self.reads_texels())
             .define("PACKED", self.packed())
             .define("SHIFTED", self.packed() && self.variant.shifted)
             .define("LIGHTS", self.lights)

@@ -66,6 +66,11 @@ impl Groups {
         self.of[receiver] == self.of[occluder] && !self.transparent[occluder]
     }
 
+    /// Whether two entities never move against each other.
+    pub fn are_one(&self, a: usize, b: usize) -> bool {
+        self.of[a] == self.of[b]
+    }
+
     /// The members of every group, in order.
     pub fn members(&self) -> Vec<Vec<usize>> {
         let mut members = vec![Vec::new(); self.of.len()];

@@ -216,6 +216,17 @@ impl SceneBuffers {
         })
     }
 
+    /// Whether any surface has maps of self-visibility.
+    pub fn has_self_shadows(&self) -> bool {
+        self.surfaces.iter().any(|surface| surface.self_first != NONE)
+    }
+
+    /// Whether an entity has an occlusion field that holds anything.
+    pub fn shadows(&self, scene: &Scene, entity: usize) -> bool {
+        let blocked = &self.meshes[scene.entities[entity].mesh].blocked;
+        blocked.as_ref().is_some_and(|slot| slot.extent != Extent::Nothing)
+    }
+
     /// Device memory of all textures, bytes.
     pub fn texture_bytes(&self) -> u64 {
         let is_first = |i: &usize| !self.textures[..*i].iter().any(|other| Arc::ptr_eq(other, &self.textures[*i]));

@@ -1,0 +1,369 @@
+//! Passes "runs" and "bounce": light that surfaces of a rigid group pass on to each other.
+//!
+//! A vertex has links to runs of neighbouring vertices that it sees ([`crate::bake::links`]); a run has the mean light
+//! that leaves its vertices. The two passes alternate, once a bounce: means of all runs, and for every vertex its direct
+//! light and albedo times the light along its links. That is Jacobi's iteration of the radiosity equation: each step adds
+//! a bounce.
+//!
+//! Between groups light goes by [`movers`]: what moves reflects onto everything by its occlusion field, and receives
+//! from larger runs of all that rests, as flat pieces seen from afar with nothing between; where they take more than the
+//! hemisphere, as furniture before a wall does, they are scaled down to it. The first steps are without it, as it needs
+//! the light that they bring. Only fronts reflect. A lamp in spherical harmonics inside a closed mesh lights nothing of
+//! it, as the mesh's transfer ends where its own far side blocks; a sharp one does.
+
+pub mod movers;
+pub(crate) mod twin;
+
+use crate::asset::Mesh;
+use crate::bake::links::{RUN_BITS, RUNS, Runs, WHOLE_SHARE};
+use crate::bake::surfaces::Links;
+use crate::error::Result;
+use crate::gpu::{Access, Bind, Buffer, BufferKind, Commands, ComputePipeline, Device, TexelView};
+use crate::lists::far::{FarRun, FarRuns};
+use crate::lists::incremental::ClusterLists;
+use crate::merge::MergeInputs;
+use crate::merge::variant::MergePermutation;
+use crate::scene::Placement;
+use crate::shaders::{Library, ShaderPermutation};
+use ash::vk;
+use glam::DVec3;
+use movers::{Movers, Surfaces};
+use std::sync::Arc;
+
+/// How often light bounces.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+#[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
+#[serde(rename_all = "lowercase")]
+pub enum Bounces {
+    /// Direct light alone.
+    #[cfg_attr(feature = "cli", value(name = "0"))]
+    None,
+    #[cfg_attr(feature = "cli", value(name = "1"))]
+    One,
+    /// As many as are seen: at most eight.
+    #[default]
+    All,
+}
+
+impl Bounces {
+    /// How many there may be.
+    pub fn most(self) -> u32 {
+        match self {
+            Bounces::None => 0,
+            Bounces::One => 1,
+            Bounces::All => MOST,
+        }
+    }
+}
+
+/// All bounces. In a closed room of albedo 0.7 they leave 0.7^8 of the light, 6 %, in an open one of the
+/// same 1 %.
+const MOST: u32 = 8;
+/// Light that further bounces would bring, where all vertices had a direct light of 1: the root of its mean square.
+const LEAST_CHANGE: f64 = 0.005;
+/// Steps with light from other groups, the last ones.
+const MET: u32 = 2;
+
+/// Links of all vertices of a scene, by the places of entities' vertices in the buffers of light.
+#[derive(Default)]
+pub struct Linked {
+    /// First vertex and number of vertices of every run.
+    runs: Vec<[u32; 2]>,
+    /// A third of the triangles around each vertex.
+    areas: Vec<f32>,
+    /// For each vertex its first link, and the number of its links below its entity.
+    ranges: Vec<[u32; 2]>,
+    /// Numbers of runs below their shares.
+    links: Vec<u32>,
+    /// All runs, of which those that rest are seen by what moves.
+    far: FarRuns,
+    surfaces: Surfaces,
+    /// Whether anything that moves receives light.
+    receives: bool,
+}
+
+impl Linked {
+    /// The links of a scene's entities, of which those of one list of `rigid` never move against each other; `None` where
+    /// no vertex has any and nothing moves, or where there are more runs than links can number.
+    pub fn new(entities: &[LinkedEntity<'_>], rigid: &[Vec<usize>]) -> Option<Self> {
+        let vertices = entities.iter().map(|entity| entity.order.len()).sum();
+        let mut linked = Linked {
+            areas: vec![0.0; vertices],
+            ranges: vec![[0, 0]; vertices],
+            surfaces: Surfaces::new(entities),
+            receives: entities.iter().any(|entity| !entity.rests && entity.receives),
+            ..Linked::default()
+        };
+        for members in rigid {
+            let base = linked.runs.len() as u32;
+            let runs = Runs::new(members.iter().map(|&member| entities[member].order.len()));
+            let run = |(member, first, count): (usize, usize, usize)| {
+                [(entities[members[member]].first + first) as u32, count as u32]
+            };
+            linked.runs.extend(runs.all().map(run));
+            for &member in members {
+                linked.add(member, &entities[member], base);
+            }
+            linked.surfaces.add(entities, members, &runs, base);
+            if members.iter().all(|&member| entities[member].rests) {
+                linked.see_from_afar(entities, members, &runs, base);
+            }
+            linked.far.runs.resize(linked.runs.len(), FarRun::default());
+        }
+        if linked.runs.len() >= 1 << RUN_BITS {
+            log::warn!("light does not bounce: {} runs of vertices are more than links number", linked.runs.len());
+            return None;
+        }
+        if linked.links.is_empty() && !linked.meets() {
+            return None;
+        }
+        // No buffer is empty.
+        linked.links.extend(linked.links.is_empty().then_some(0));
+        Some(linked)
+    }
+
+    /// Whether light bounces between groups.
+    fn meets(&self) -> bool {
+        !self.surfaces.is_empty() || (self.receives && !self.far.roots.is_empty())
+    }
+
+    /// Adds the runs of a group that rests, numbered from `base`.
+    fn see_from_afar(&mut self, entities: &[LinkedEntity<'_>], members: &[usize], runs: &Runs, base: u32) {
+        let areas: Vec<_> = members.iter().map(|&member| entities[member].mesh.vertex_areas_m2()).collect();
+        let all = runs.all().enumerate();
+        self.far.runs.extend(all.map(|(number, (member, first, vertices))| {
+            let entity = &entities[members[member]];
+            let scale = f64::from(entity.placement.scale);
+            let mut middle = DVec3::ZERO;
+            let mut across = DVec3::ZERO;
+            let mut whole = 0.0;
+            let places = || entity.order[first..first + vertices].iter().map(|&v| v as usize);
+            let position = |v: usize| entity.placement.point(entity.mesh.positions[v].as_dvec3());
+            for v in places() {
+                let area = areas[member][v] * scale * scale;
+                middle += area * position(v);
+                across += area * (entity.placement.turn() * entity.mesh.normals[v].as_dvec3());
+                whole += area;
+            }
+            middle /= f64::max(whole, 1e-30);
+            let parts = runs.parts(number as u32);
+            FarRun {
+                middle: middle.as_vec3(),
+                radius_m: places().map(|v| position(v).distance(middle)).fold(0.0, f64::max) as f32,
+                across: across.as_vec3(),
+                area_m2: whole as f32,
+                parts: base + parts.start..base + parts.end,
+            }
+        }));
+        self.far.roots.extend(runs.of_size(RUNS.len() - 1).map(|(number, _)| base + number));
+    }
+
+    fn add(&mut self, index: usize, entity: &LinkedEntity<'_>, base: u32) {
+        let areas = entity.mesh.vertex_areas_m2();
+        for (place, &v) in (entity.first..).zip(entity.order) {
+            self.areas[place] = areas[v as usize] as f32;
+        }
+        let ranges = &mut self.ranges[entity.first..][..entity.order.len()];
+        ranges.fill([0, (index as u32) << 8]);
+        let Some(links) = &entity.links else { return };
+        let mut from = self.links.len() as u32;
+        for (range, &count) in ranges.iter_mut().zip(&links.counts) {
+            *range = [from, u32::from(count) | range[1]];
+            from += u32::from(count);
+        }
+        self.links.extend(links.packed.iter().map(|link| link + base));
+    }
+}
+
+/// An entity whose vertices may have links.
+pub struct LinkedEntity<'e> {
+    pub mesh: &'e Mesh,
+    /// Which vertex of the mesh stands at each place of the buffers of light.
+    pub order: &'e [u32],
+    /// The first of these places.
+    pub first: usize,
+    /// Its mesh's bounding sphere, metres.
+    pub centre_m: DVec3,
+    pub radius_m: f64,
+    /// Whether others see it by its occlusion field.
+    pub reflects: bool,
+    /// Whether it never moves, and where it stands then.
+    pub rests: bool,
+    pub placement: Placement,
+    pub receives: bool,
+    pub links: Option<Arc<Links>>,
+}
+
+/// Light of every vertex before and after bounces: of all lights, and without that of sharp ones where there are any.
+pub struct BouncedLight<'b> {
+    pub direct: &'b Buffer,
+    pub radiosity: &'b Buffer,
+    pub soft_direct: Option<&'b Buffer>,
+    pub soft: Option<&'b Buffer>,
+}
+
+pub struct Bounce {
+    means: ComputePipeline,
+    bounce: ComputePipeline,
+    texels: bool,
+    runs: Buffer,
+    areas: Buffer,
+    ranges: Buffer,
+    links: Buffer,
+    run_light: Buffer,
+    counts: [u32; 2],
+    movers: Option<Movers>,
+    /// Steps after which more bounces are not seen.
+    steps: u32,
+}
+
+impl Bounce {
+    /// `soft` tells whether the scene has sharp lights; `merge` reads fields as these passes will, and `self_shadows`
+    /// tells whether there are maps of self-visibility.
+    pub fn new(
+        device: &Arc<Device>,
+        library: &Library,
+        linked: Linked,
+        soft: bool,
+        merge: MergePermutation,
+        self_shadows: bool,
+    ) -> Result<Self> {
+        let counts = [linked.runs.len() as u32, linked.ranges.len() as u32];
+        let run_light = Buffer::new(device, "light of runs", BufferKind::Device, 16 * u64::from(counts[0]))?;
+        let fits = TexelView::fits(device, vk::Format::R32_UINT, 4 * linked.links.len() as u64)
+            && TexelView::fits(device, vk::Format::R32G32B32A32_SFLOAT, 16 * u64::from(counts[1]));
+        let texels = merge.reads_texels() && fits;
+        let meets = linked.meets();
+        let pipeline =
+            |name: &str, row: ShaderPermutation| ComputePipeline::new(device, name, &library.shader(&row)?, &[]);
+        let Linked { surfaces, far, ranges, .. } = linked;
+        let movers = || Movers::new(device, library, (surfaces, far), merge, self_shadows, ranges.len());
+        Ok(Bounce {
+            means: pipeline("runs", runs_row(texels))?,
+            bounce: pipeline("bounce", bounce_row(texels, soft, meets))?,
+            texels,
+            runs: Buffer::with_data(device, "runs", &linked.runs)?,
+            areas: Buffer::with_data(device, "areas of vertices", &linked.areas)?,
+            ranges: Buffer::with_data(device, "ranges of links", &ranges)?,
+            links: Buffer::with_data(device, "links", &linked.links)?,
+            run_light,
+            steps: MOST,
+            counts,
+            movers: meets.then(movers).transpose()?,
+        })
+    }
+
+    /// Finds how many steps surfaces of these albedos need.
+    pub fn set_albedos(&mut self, albedos: &[f32]) -> Result<()> {
+        let host = self.download()?;
+        let mut light = vec![1.0; host.ranges.len()];
+        let mut steps = 0;
+        let is_seen = |light: &[f64]| {
+            let squares: f64 = light.iter().map(|light| light * light).sum();
+            squares > LEAST_CHANGE * LEAST_CHANGE * light.len() as f64
+        };
+        while steps < MOST && is_seen(&light) {
+            let of_runs = host.means(&light);
+            let bounced = |(first, entity, count)| f64::from(albedos[entity]) * host.along(first, count, &of_runs);
+            light = host.vertices().map(bounced).collect();
+            steps += 1;
+        }
+        let least = if self.movers.is_some() { MET + 1 } else { 1 };
+        self.steps = steps.clamp(least, MOST);
+        Ok(())
+    }
+
+    /// Steps for bounces: as many as are seen.
+    pub fn steps(&self, bounces: Bounces) -> u32 {
+        bounces.most().min(self.steps)
+    }
+
+    /// Prepares the lists of what moves for the lists' present time.
+    pub(crate) fn prepare(&mut self, lists: &ClusterLists) -> Result<()> {
+        self.movers.as_mut().map_or(Ok(()), |movers| movers.prepare(lists))
+    }
+
+    /// How what it reads of the merge is to be bound, if it reads any.
+    pub fn reads(&self) -> Option<&MergePermutation> {
+        self.movers.as_ref().map(Movers::permutation)
+    }
+
+    pub fn size_bytes(&self) -> u64 {
+        let all = [&self.runs, &self.areas, &self.ranges, &self.links, &self.run_light];
+        let movers = self.movers.as_ref().map_or(0, Movers::size_bytes);
+        all.iter().map(|buffer| buffer.size_bytes).sum::<u64>() + movers
+    }
+
+    /// Adds bounces, one a step, to the direct light of all vertices, which was written before.
+    pub fn record<'r>(&'r self, commands: &mut Commands<'r>, work: &BounceWork<'r>) -> Result<()> {
+        let BounceWork { entities, light, steps, .. } = work;
+        let quads = vk::Format::R32G32B32A32_SFLOAT;
+        let written = |commands: &mut Commands<'r>| {
+            commands.barrier(Access::ComputeWrite, Access::ComputeRead);
+            commands.barrier(Access::ComputeWrite, Access::ComputeSampled);
+        };
+        let [run_count, vertex_count] = self.counts;
+        let alone = steps.saturating_sub(MET);
+        for step in 0..*steps {
+            let from = if step == 0 { light.direct } else { light.radiosity };
+            let resources = [
+                Bind::Buffer(&self.runs),
+                Bind::Buffer(&self.areas),
+                read(self.texels, from, quads)?,
+                Bind::Buffer(&self.run_light),
+            ];
+            commands.dispatch(&self.means, &resources, &run_count, [run_count, 1, 1])?;
+            written(commands);
+            let met = self.movers.as_ref().zip(work.met.as_ref());
+            if let Some((movers, (inputs, self_cells))) = met.filter(|_| step == alone) {
+                movers.record(commands, inputs, *self_cells, &self.run_light, *steps > 1)?;
+                written(commands);
+            }
+            let mut resources = vec![
+                Bind::Buffer(entities),
+                Bind::Buffer(&self.ranges),
+                read(self.texels, &self.links, vk::Format::R32_UINT)?,
+                read(self.texels, &self.run_light, quads)?,
+                Bind::Buffer(light.direct),
+                Bind::Buffer(light.radiosity),
+                light.soft_direct.map_or(Bind::None, Bind::Buffer),
+                light.soft.map_or(Bind::None, Bind::Buffer),
+            ];
+            resources.extend(self.movers.as_ref().map(|movers| Bind::Buffer(&movers.incoming)));
+            // Pixels read the last step alone.
+            let push = [vertex_count, u32::from(step + 1 == *steps), u32::from(step >= alone)];
+            commands.dispatch(&self.bounce, &resources, &push, [vertex_count, 1, 1])?;
+            if step + 1 < *steps {
+                written(commands);
+                commands.barrier(Access::ComputeWrite, Access::ComputeWrite);
+            }
+        }
+        Ok(())
+    }
+}
+
+/// What the passes read and write in a frame.
+pub struct BounceWork<'w> {
+    pub entities: &'w Buffer,
+    pub light: BouncedLight<'w>,
+    pub steps: u32,
+    /// What the merge reads, by [`Bounce::reads`], and the maps of self-visibility where there are any.
+    pub met: Option<(MergeInputs<'w>, Option<&'w Buffer>)>,
+}
+
+fn read<'r>(texels: bool, buffer: &'r Buffer, format: vk::Format) -> Result<Bind<'r>> {
+    Ok(if texels { Bind::Texel(TexelView::new(buffer, format)?) } else { Bind::Buffer(buffer) })
+}
+
+pub fn runs_row(texels: bool) -> ShaderPermutation {
+    ShaderPermutation::new("runs.comp", 4).define("TEXEL", texels)
+}
+
+pub fn bounce_row(texels: bool, soft: bool, movers: bool) -> ShaderPermutation {
+    ShaderPermutation::new("bounce.comp", 4)
+        .define("TEXEL", texels)
+        .define("SOFT", soft)
+        .define("MOVERS", movers)
+        .define("RUN_BITS", RUN_BITS)
+        .number("WHOLE_SHARE", f64::from(WHOLE_SHARE))
+}

@@ -1,0 +1,264 @@
+//! Light that bounces between rigid groups: passes "lobes" and "movers".
+//!
+//! A thing that moves has six lobes, one for each direction of its axes: the mean light that leaves its vertices, by how
+//! much they face that way, and where they are. Every vertex near it reads its occlusion field, which holds the very
+//! outline: its product with the cosine lobe of the vertex is the share of the view that the thing takes, and the light
+//! of the lobes that face the vertex comes from there. The same share is taken from what the vertex's own group reflects
+//! onto it. What moves sees all that rests as flat pieces, with nothing between.
+
+use super::{LinkedEntity, read};
+use crate::bake::links::{RUNS, Runs};
+use crate::error::Result;
+use crate::field::self_visibility;
+use crate::gpu::{Access, Bind, Buffer, Commands, ComputePipeline, Device, Upload};
+use crate::layout::CLUSTER_VERTICES;
+use crate::lists::far::{FarRun, FarRuns, RUN_BITS, WHOLE};
+use crate::lists::incremental::{CUT_HEADER, ClusterLists, Reflectors};
+use crate::merge::MergeInputs;
+use crate::merge::variant::MergePermutation;
+use crate::sh::lobe::clamped_cosine;
+use crate::shaders::{Library, ShaderPermutation};
+use ash::vk;
+use bytemuck::{Pod, Zeroable};
+use glam::DVec3;
+use std::f64::consts::PI;
+use std::sync::Arc;
+
+/// Coefficients of the light that leaves a thing, by direction: three bands.
+pub(super) const OUTGOING: usize = 9;
+/// Most runs of which that is summed, a workgroup's worth; where there are more, the next larger ones are taken.
+const MOST_RUNS: usize = 64;
+/// Share of a disc's area over which places count as over its middle.
+pub(super) const OVER: f64 = 0.8;
+/// Width of the smoothing of cosines, in radii of the disc: what makes it right far above the disc's middle.
+pub(super) const SMOOTH: f64 = 4.0 / (3.0 * PI);
+
+/// The surfaces of those entities of a scene that reflect.
+#[derive(Default)]
+pub(super) struct Surfaces {
+    /// Whether each entity reflects by its field.
+    pub reflects: Vec<bool>,
+    pub rests: Vec<bool>,
+    pub movers: Vec<Mover>,
+    pub runs: Vec<MoverRun>,
+}
+
+/// An entity that reflects.
+#[repr(C)]
+#[derive(Clone, Copy, Pod, Zeroable)]
+pub(super) struct Mover {
+    pub entity: u32,
+    pub run_first: u32,
+    pub run_count: u32,
+    /// Entries of its cut of what rests, in the last lists.
+    pub far_first: u32,
+    pub far_count: u32,
+}
+
+/// A run of its vertices.
+#[repr(C)]
+#[derive(Clone, Copy, Pod, Zeroable)]
+pub(super) struct MoverRun {
+    /// In r from the centre of the entity's bounding sphere, its frame; and the bits of the run's number.
+    pub middle: [f32; 4],
+    /// Mean normal.
+    pub normal: [f32; 4],
+    /// Its area by direction, as seen from there, in SH: m^2 of the mesh.
+    pub lobe: [f32; 12],
+}
+
+impl Surfaces {
+    /// Without runs.
+    pub fn new(entities: &[LinkedEntity<'_>]) -> Self {
+        Surfaces {
+            reflects: entities.iter().map(|entity| entity.reflects).collect(),
+            rests: entities.iter().map(|entity| entity.rests).collect(),
+            ..Surfaces::default()
+        }
+    }
+
+    pub fn is_empty(&self) -> bool {
+        self.movers.is_empty()
+    }
+
+    /// Adds those members of a group that reflect, with runs numbered from `base`.
+    pub fn add(&mut self, entities: &[LinkedEntity<'_>], members: &[usize], runs: &Runs, base: u32) {
+        for (member, &index) in members.iter().enumerate().filter(|(_, index)| entities[**index].reflects) {
+            let entity = &entities[index];
+            let of_size = |size| runs.of_size(size).filter(move |(_, run)| run.0 == member);
+            let size = (0..RUNS.len()).find(|&size| of_size(size).count() <= MOST_RUNS);
+            let areas = entity.mesh.vertex_areas_m2();
+            let run = |(number, (_, first, vertices)): (u32, (usize, usize, usize))| {
+                let mut area = 0.0;
+                let mut middle = DVec3::ZERO;
+                let mut normal = DVec3::ZERO;
+                let mut lobe = [0.0; 12];
+                for v in entity.order[first..first + vertices].iter().map(|&v| v as usize) {
+                    let of_vertex = entity.mesh.normals[v].as_dvec3();
+                    area += areas[v];
+                    middle += areas[v] * (entity.mesh.positions[v].as_dvec3() - entity.centre_m);
+                    normal += areas[v] * of_vertex;
+                    for (sum, c) in lobe.iter_mut().zip(clamped_cosine(3, of_vertex)) {
+                        *sum += areas[v] * c;
+                    }
+                }
+                let middle = (middle / f64::max(area, 1e-30) / entity.radius_m).as_vec3();
+                MoverRun {
+                    middle: middle.extend(f32::from_bits(base + number)).to_array(),
+                    normal: normal.normalize_or_zero().as_vec3().extend(0.0).to_array(),
+                    lobe: lobe.map(|c| c as f32),
+                }
+            };
+            let run_first = self.runs.len() as u32;
+            // Of the largest, what is too much is left out.
+            self.runs.extend(of_size(size.unwrap_or(RUNS.len() - 1)).take(MOST_RUNS).map(run));
+            let run_count = self.runs.len() as u32 - run_first;
+            self.movers.push(Mover { entity: index as u32, run_first, run_count, far_first: 0, far_count: 0 });
+        }
+    }
+}
+
+/// The passes on a device.
+pub(super) struct Movers {
+    outgoing: ComputePipeline,
+    movers: ComputePipeline,
+    permutation: MergePermutation,
+    pub surfaces: Surfaces,
+    pub far: FarRuns,
+    far_data: Buffer,
+    movers_data: Upload,
+    runs: Buffer,
+    /// Of every entity, nine quads.
+    light: Buffer,
+    /// Of every vertex: share of the view times radiosity, and share that is taken.
+    pub incoming: Buffer,
+    pub clusters: Upload,
+    pub entries: Upload,
+    pub cluster_count: u32,
+}
+
+impl Movers {
+    pub fn new(
+        device: &Arc<Device>,
+        library: &Library,
+        (surfaces, far): (Surfaces, FarRuns),
+        permutation: MergePermutation,
+        self_shadows: bool,
+        vertices: usize,
+    ) -> Result<Self> {
+        let pipeline =
+            |name: &str, row: ShaderPermutation| ComputePipeline::new(device, name, &library.shader(&row)?, &[]);
+        // No buffer is empty.
+        let buffer = |name: &str, quads: &[[f32; 4]]| match quads {
+            [] => Buffer::zeros(device, name, 16),
+            quads => Buffer::with_data(device, name, quads),
+        };
+        let quads = |run: &FarRun| {
+            let area = run.across.length();
+            [run.middle.extend(0.0).to_array(), (run.across / area.max(1e-20)).extend(area).to_array()]
+        };
+        let far_data: Vec<[f32; 4]> = far.runs.iter().flat_map(quads).collect();
+        Ok(Movers {
+            outgoing: pipeline("outgoing", outgoing_row(&permutation))?,
+            movers: pipeline("movers", movers_row(&permutation, self_shadows))?,
+            far_data: buffer("far runs", &far_data)?,
+            movers_data: Upload::new(device, "movers", size_of_val(&surfaces.movers[..]).max(32) as u64)?,
+            runs: buffer("runs of movers", bytemuck::cast_slice(&surfaces.runs))?,
+            light: Buffer::zeros(device, "light of movers", (16 * OUTGOING * surfaces.rests.len()) as u64)?,
+            incoming: Buffer::zeros(device, "light from other groups", 16 * vertices as u64)?,
+            clusters: Upload::new(device, "clusters of movers", 64)?,
+            entries: Upload::new(device, "lists of movers", 64)?,
+            cluster_count: 0,
+            permutation,
+            surfaces,
+            far,
+        })
+    }
+
+    /// Lists what each cluster meets at the lists' time.
+    pub fn prepare(&mut self, lists: &ClusterLists) -> Result<()> {
+        let Surfaces { reflects, rests, movers, .. } = &mut self.surfaces;
+        let of =
+            Reflectors { movers: movers.iter().map(|mover| mover.entity as usize), reflects, rests, far: &self.far };
+        let (clusters, entries, cuts) = lists.reflectors(&of);
+        for (mover, [first, count]) in movers.iter_mut().zip(cuts) {
+            mover.far_first = first;
+            mover.far_count = count;
+        }
+        self.movers_data.write(movers)?;
+        self.cluster_count = clusters.len() as u32;
+        self.clusters.write(&clusters)?;
+        self.entries.write(&entries)
+    }
+
+    pub fn size_bytes(&self) -> u64 {
+        let all = [&self.far_data, &self.runs, &self.light, &self.incoming];
+        all.iter().map(|buffer| buffer.size_bytes).sum::<u64>()
+            + [&self.movers_data, &self.clusters, &self.entries].iter().map(|upload| upload.all_bytes()).sum::<u64>()
+    }
+
+    /// Which variant its inputs are to be read by.
+    pub fn permutation(&self) -> &MergePermutation {
+        &self.permutation
+    }
+
+    /// Writes what every vertex receives from other groups, after the light of all runs was written. What moves reflects
+    /// light of what rests too where `bounced` says so.
+    pub fn record<'r>(
+        &'r self,
+        commands: &mut Commands<'r>,
+        inputs: &MergeInputs<'r>,
+        self_cells: Option<&'r Buffer>,
+        run_light: &'r Buffer,
+        bounced: bool,
+    ) -> Result<()> {
+        let texels = self.permutation.reads_texels();
+        let quads = vk::Format::R32G32B32A32_SFLOAT;
+        let shared = || -> Result<[Bind<'r>; 4]> {
+            Ok([
+                inputs.entities.bind(),
+                read(texels, &self.entries, vk::Format::R32_UINT)?,
+                read(texels, &self.far_data, quads)?,
+                read(texels, run_light, quads)?,
+            ])
+        };
+        let of_outgoing = [Bind::Buffer(&self.movers_data), Bind::Buffer(&self.runs), Bind::Buffer(&self.light)];
+        let resources: Vec<Bind<'r>> = shared()?.into_iter().chain(of_outgoing).collect();
+        let count = self.surfaces.movers.len() as u32 * MOST_RUNS as u32;
+        commands.dispatch(&self.outgoing, &resources, &u32::from(bounced), [count, 1, 1])?;
+        commands.barrier(Access::ComputeWrite, Access::ComputeRead);
+        commands.barrier(Access::ComputeWrite, Access::ComputeSampled);
+        let of_movers = [
+            Bind::Buffer(&self.clusters),
+            inputs.fields.bind(),
+            inputs.transfers.bind(),
+            inputs.vertices.bind(),
+            read(texels, &self.light, quads)?,
+            Bind::Buffer(&self.incoming),
+            self_cells.map_or(Ok(Bind::None), |cells| read(texels, cells, vk::Format::R32G32_UINT))?,
+        ];
+        let resources: Vec<Bind<'r>> = shared()?.into_iter().chain(of_movers).collect();
+        commands.dispatch(&self.movers, &resources, &(), [self.cluster_count * CLUSTER_VERTICES, 1, 1])
+    }
+}
+
+pub fn outgoing_row(permutation: &MergePermutation) -> ShaderPermutation {
+    far_row(permutation, "outgoing.comp").define("RUNS", MOST_RUNS as u32)
+}
+
+pub fn movers_row(permutation: &MergePermutation, self_shadows: bool) -> ShaderPermutation {
+    far_row(permutation, "movers.comp")
+        .define("SELF", self_shadows)
+        .define("CUT_HEADER", CUT_HEADER as u32)
+        .define("SELF_CELLS", self_visibility::CELLS as u32)
+        .self_visibility()
+}
+
+fn far_row(permutation: &MergePermutation, file: &'static str) -> ShaderPermutation {
+    permutation
+        .row_of(file)
+        .define("RUN_BITS", RUN_BITS)
+        .number("WHOLE_SHARE", f64::from(WHOLE))
+        .number("OVER", OVER)
+        .number("SMOOTH", SMOOTH)
+}

@@ -1,0 +1,274 @@
+//! The CPU twin of the passes in f64, from the same links, lists and fields.
+
+use super::movers::{Movers, OUTGOING, OVER, SMOOTH};
+use super::{Bounce, MET};
+use crate::bake::links::{RUN_BITS, WHOLE_SHARE};
+use crate::error::Result;
+use crate::field::self_visibility;
+use crate::layout::Cluster;
+use crate::lists::far::WHOLE;
+use crate::lists::incremental::CUT_HEADER;
+use crate::lists::skip::Skip;
+use crate::merge::twin::{Cone, MergeObject};
+use crate::sh::basis::{MAX_COEFFICIENTS, evaluate};
+use crate::sh::lobe::clamped_cosine;
+use glam::{DVec3, Vec3, Vec4, Vec4Swizzles};
+use rayon::prelude::*;
+use std::f64::consts::PI;
+use std::iter::Sum;
+use std::ops::Mul;
+
+/// What the passes read of the scene and of light.
+pub struct TwinInput<'t> {
+    /// Direct light of every place of the buffers of light.
+    pub direct: &'t [DVec3],
+    pub objects: &'t [MergeObject<'t>],
+    pub skip: Skip,
+    /// Vertex of a cluster.
+    pub vertex: &'t (dyn Fn(&Cluster, usize) -> TwinVertex<'t> + Sync),
+}
+
+/// A vertex that light bounces onto.
+pub struct TwinVertex<'t> {
+    /// World.
+    pub position: DVec3,
+    /// In the frame of its entity.
+    pub normal: DVec3,
+    /// Its stored transfer and its map of self-visibility, if it has any.
+    pub transfer: Option<&'t [f32]>,
+    pub map: Option<&'t [u8]>,
+}
+
+impl Bounce {
+    /// Light of every place after so many steps.
+    pub fn twin(&self, input: &TwinInput<'_>, steps: u32) -> Result<Vec<DVec3>> {
+        let host = self.download()?;
+        let mut light = input.direct.to_vec();
+        let mut incoming = vec![(DVec3::ZERO, 0.0); light.len()];
+        for step in 0..steps {
+            let of_runs = host.means(&light);
+            if let Some(movers) = self.movers.as_ref().filter(|_| step == steps.saturating_sub(MET)) {
+                movers.twin(input, &of_runs, steps > 1, &mut incoming)?;
+            }
+            let bounced = |(place, (first, entity, count)): (usize, (usize, usize, usize))| {
+                let (met, taken) = incoming[place];
+                let albedo = DVec3::from(input.objects[entity].albedo_over_pi);
+                input.direct[place] + PI * albedo * (host.along(first, count, &of_runs) * (1.0 - taken) + met)
+            };
+            light = host.vertices().enumerate().map(bounced).collect();
+        }
+        Ok(light)
+    }
+
+    /// What the passes read of links, in host memory.
+    pub(super) fn download(&self) -> Result<HostLinks> {
+        let [run_count, vertex_count] = self.counts.map(|count| count as usize);
+        Ok(HostLinks {
+            runs: self.runs.download(run_count)?,
+            areas: self.areas.download(vertex_count)?,
+            ranges: self.ranges.download(vertex_count)?,
+            links: self.links.download((self.links.size_bytes / 4) as usize)?,
+        })
+    }
+}
+
+/// The links of all vertices, as [`super::Linked`] has them.
+pub(super) struct HostLinks {
+    runs: Vec<[u32; 2]>,
+    areas: Vec<f32>,
+    pub ranges: Vec<[u32; 2]>,
+    links: Vec<u32>,
+}
+
+impl HostLinks {
+    /// Mean light of every run.
+    pub fn means<L: Copy + Sum + Mul<f64, Output = L> + Send + Sync>(&self, light: &[L]) -> Vec<L> {
+        let mean = |[first, count]: &[u32; 2]| {
+            let places = *first as usize..(first + count) as usize;
+            let whole: f64 = self.areas[places.clone()].iter().map(|area| f64::from(*area)).sum();
+            places.map(|v| light[v] * (f64::from(self.areas[v]) / whole.max(1e-30))).sum()
+        };
+        self.runs.par_iter().map(mean).collect()
+    }
+
+    /// First link, entity and number of links of every vertex.
+    pub fn vertices(&self) -> impl Iterator<Item = (usize, usize, usize)> {
+        self.ranges.iter().map(|[first, packed]| (*first as usize, (packed >> 8) as usize, (packed & 255) as usize))
+    }
+
+    /// Light along links, as a share of the hemisphere times radiosity.
+    pub fn along<L: Copy + Sum + Mul<f64, Output = L>>(&self, first: usize, count: usize, of_runs: &[L]) -> L {
+        let run = |link: &u32| of_runs[(link & ((1 << RUN_BITS) - 1)) as usize];
+        let links = self.links[first..][..count].iter();
+        links.map(|link| run(link) * (f64::from(link >> RUN_BITS) / f64::from(WHOLE_SHARE))).sum()
+    }
+}
+
+impl Movers {
+    /// What every vertex receives from other groups, and the share of its view that they take.
+    fn twin(
+        &self,
+        input: &TwinInput<'_>,
+        of_runs: &[DVec3],
+        bounced: bool,
+        incoming: &mut [(DVec3, f64)],
+    ) -> Result<()> {
+        let clusters: Vec<Cluster> = self.clusters.download(self.cluster_count as usize)?;
+        let entries: Vec<u32> = self.entries.download((self.entries.size_bytes / 4) as usize)?;
+        let some = |first: u32, count: u32| &entries[first as usize..][..count as usize];
+        let mut outgoing = vec![[(DVec3::ZERO, 0.0); OUTGOING]; input.objects.len()];
+        for mover in &self.surfaces.movers {
+            let object = &input.objects[mover.entity as usize];
+            for run in &self.surfaces.runs[mover.run_first as usize..][..mover.run_count as usize] {
+                let [middle, normal] = [run.middle, run.normal].map(|quad| Vec4::from(quad).xyz().as_dvec3());
+                let mut light = of_runs[run.middle[3].to_bits() as usize];
+                if bounced {
+                    let place = object.centre + object.rotation * (middle * object.radius_m);
+                    let runs = some(mover.far_first, mover.far_count);
+                    let met = within_hemisphere(self.near_light(runs, of_runs, place, object.rotation * normal));
+                    light += PI * DVec3::from(object.albedo_over_pi) * met;
+                }
+                for ((sum, area), weight) in outgoing[mover.entity as usize].iter_mut().zip(run.lobe) {
+                    *sum += f64::from(weight) * light;
+                    *area += f64::from(weight);
+                }
+            }
+        }
+        let of_cluster = |cluster: &Cluster| {
+            let receiver = &input.objects[cluster.receiver as usize];
+            let (header, list) = some(cluster.entry_first, cluster.entry_count).split_at(CUT_HEADER);
+            let (near, list) = list.split_at(header[3] as usize);
+            let (far, list) = list.split_at(header[4] as usize);
+            let middle = Vec3::from(std::array::from_fn(|i| f32::from_bits(header[i]))).as_dvec3();
+            let far = self.far_light(far, of_runs, receiver.centre + middle);
+            let of_vertex = |v: usize| {
+                let vertex = (input.vertex)(cluster, v);
+                let normal = receiver.rotation * vertex.normal;
+                let (near, near_share) = self.near_light(near, of_runs, vertex.position, normal);
+                let cosine = clamped_cosine(3, normal);
+                let seen_far: DVec3 = far.iter().zip(&cosine).map(|((light, _), c)| *light * *c).sum();
+                let far_share: f64 = far.iter().zip(&cosine).map(|((_, share), c)| share * c).sum();
+                let at_rest = within_hemisphere((near + seen_far.max(DVec3::ZERO), near_share + far_share.max(0.0)));
+                let mut sum = DVec3::ZERO;
+                let mut taken = 0.0;
+                for &entity in list {
+                    let object = &input.objects[entity as usize];
+                    let cone = Cone::new(object.centre, object.radius_m, vertex.position);
+                    let to_object = object.rotation.inverse();
+                    let from = to_object * (vertex.position - object.centre) / object.radius_m;
+                    let field = object.blocked.expect("what reflects has an occlusion field");
+                    let mut blocked = [0.0; MAX_COEFFICIENTS];
+                    field.lookup(from, 0, &mut blocked);
+                    let cosine = clamped_cosine(field.header.bands.min(self.permutation().bands), to_object * normal);
+                    let share: f64 = blocked.iter().zip(&cosine).map(|(b, c)| b * c).sum();
+                    let own = own_visible(&vertex, receiver, &cone, object.radius_m);
+                    let share = share * cone.above_horizon(normal, input.skip) * object.opacity / PI * own;
+                    let share = share.max(0.0);
+                    let middle = match field.header.bands {
+                        1 => from,
+                        _ => DVec3::new(blocked[3], blocked[1], -blocked[2]),
+                    };
+                    sum += share * seen(&outgoing[entity as usize], middle.normalize_or_zero());
+                    taken += share;
+                }
+                let scale = 1.0 / f64::max(taken, 1.0);
+                (at_rest * (1.0 - taken * scale) + sum * scale, taken * scale)
+            };
+            (0..cluster.vertex_count as usize).map(of_vertex).collect::<Vec<_>>()
+        };
+        let found: Vec<Vec<(DVec3, f64)>> = clusters.par_iter().map(of_cluster).collect();
+        for (cluster, found) in clusters.iter().zip(found) {
+            incoming[cluster.radiosity_first as usize..][..found.len()].copy_from_slice(&found);
+        }
+        Ok(())
+    }
+
+    /// Sums of shares of the cosine-weighted hemisphere times radiosity, and of the shares.
+    fn near_light(&self, entries: &[u32], of_runs: &[DVec3], place: DVec3, normal: DVec3) -> (DVec3, f64) {
+        let of_entry = |entry: &u32| {
+            let run = self.seen_run(*entry, place);
+            let faces = -normal.dot(run.axis);
+            let aside = (run.to.length_squared() - run.height * run.height).max(1e-20);
+            let beyond = (aside - OVER * run.area / PI).max(0.0);
+            let cosine = faces * run.height + (normal.dot(run.to) - faces * run.height) * (beyond / aside).sqrt();
+            let width = SMOOTH * (run.area / PI).sqrt();
+            let smoothed = (1.0 - faces * faces).max(0.0).sqrt() * run.height * width / (run.height + width);
+            let cosine = 0.5 * (cosine + cosine.hypot(smoothed));
+            let square = (run.height * run.height + beyond).max(1e-20);
+            let share = run.weight * cosine * run.height * run.area / (square * (PI * square + run.area));
+            (share * of_runs[run.number], share)
+        };
+        entries.iter().map(of_entry).fold((DVec3::ZERO, 0.0), |a, b| (a.0 + b.0, a.1 + b.1))
+    }
+
+    /// The same from a middle, for any normal: three bands of SH.
+    fn far_light(&self, entries: &[u32], of_runs: &[DVec3], middle: DVec3) -> [(DVec3, f64); 9] {
+        let mut sums = [(DVec3::ZERO, 0.0); 9];
+        let mut basis = [0.0; MAX_COEFFICIENTS];
+        for entry in entries {
+            let run = self.seen_run(*entry, middle);
+            let square = run.to.length_squared().max(1e-20);
+            let share = run.weight * run.height * run.area / (square.sqrt() * (PI * square + run.area));
+            evaluate(3, run.to / square.sqrt(), &mut basis);
+            for ((light, whole), y) in sums.iter_mut().zip(&basis) {
+                *light += share * y * of_runs[run.number];
+                *whole += share * y;
+            }
+        }
+        sums
+    }
+
+    fn seen_run(&self, entry: u32, place: DVec3) -> SeenRun {
+        let number = (entry & ((1 << RUN_BITS) - 1)) as usize;
+        let run = &self.far.runs[number];
+        let to = run.middle.as_dvec3() - place;
+        let area = f64::from(run.across.length());
+        let axis = run.across.as_dvec3() / area.max(1e-20);
+        let weight = f64::from(entry >> RUN_BITS) / f64::from(WHOLE);
+        SeenRun { number, weight, to, axis, area, height: (-to.dot(axis)).max(0.0) }
+    }
+}
+
+/// A run at rest, seen from a place.
+struct SeenRun {
+    number: usize,
+    weight: f64,
+    to: DVec3,
+    axis: DVec3,
+    area: f64,
+    /// Of the place over the run's plane, metres.
+    height: f64,
+}
+
+fn within_hemisphere((light, share): (DVec3, f64)) -> DVec3 {
+    light / share.max(1.0)
+}
+
+/// How much of a sphere the vertex's own group leaves visible.
+fn own_visible(vertex: &TwinVertex<'_>, receiver: &MergeObject<'_>, cone: &Cone, radius_m: f64) -> f64 {
+    let direction = receiver.rotation.inverse() * cone.toward;
+    if let Some(map) = vertex.map {
+        let sine = (radius_m / cone.distance).min(1.0);
+        return self_visibility::visible(map, vertex.normal, direction, sine, cone.distance / receiver.radius_m);
+    }
+    let Some(transfer) = vertex.transfer else { return 1.0 };
+    let bands = transfer.len().isqrt();
+    let mut basis = [0.0; MAX_COEFFICIENTS];
+    evaluate(bands, direction, &mut basis);
+    let seen: f64 = transfer.iter().zip(&basis).map(|(t, y)| f64::from(*t) * y).sum();
+    let open: f64 = clamped_cosine(bands, vertex.normal).iter().zip(&basis).map(|(c, y)| c * y).sum();
+    (seen / open.max(0.05)).clamp(0.0, 1.0)
+}
+
+/// Mean radiosity of those surfaces of a mover that are seen along a direction, which comes from the mover in its frame.
+fn seen(outgoing: &[(DVec3, f64); OUTGOING], direction: DVec3) -> DVec3 {
+    let mut basis = [0.0; MAX_COEFFICIENTS];
+    evaluate(3, direction, &mut basis);
+    let mut light = DVec3::ZERO;
+    let mut area = 0.0;
+    for ((of_light, of_area), y) in outgoing.iter().zip(&basis) {
+        light += *of_light * *y;
+        area += of_area * y;
+    }
+    light.max(DVec3::ZERO) / f64::max(area, 0.1 * basis[0] * outgoing[0].1)
+}

@@ -1,0 +1,130 @@
+//! Runs of vertices at rest as a tree, of which what moves sees a cut: small pieces nearby, large ones far away.
+//!
+//! A cluster of vertices sees near pieces vertex by vertex, and far ones from its middle, as SH for all its vertices.
+
+use glam::Vec3;
+use std::ops::Range;
+
+/// A run is opened where it is larger than this share of its distance.
+const MOST_RADIUS: f32 = 0.8;
+/// A run whose normals point all ways, so that their sum has less than this share of its area, is opened where it takes
+/// more than [`LEAST_SHARE`] of the view.
+const FLAT: f32 = 0.7;
+const LEAST_SHARE: f32 = 0.005;
+/// From this share of either bound on, the parts of a run fade in, so that no light jumps where a cut changes.
+const FADE: f32 = 0.85;
+/// A run nearer to a cluster than so many of the cluster's radii is seen by each of its vertices, and from the second
+/// on by its middle alone.
+const NEAR: [f32; 2] = [1.5, 2.0];
+/// Bits of the number of a run in an entry, below those of its weight.
+pub const RUN_BITS: u32 = 20;
+/// The weight that all bits above those stand for.
+pub const WHOLE: u32 = (1 << (32 - RUN_BITS)) - 1;
+
+/// A run at rest.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct FarRun {
+    /// Middle, world, metres, and how far its vertices lie from there.
+    pub middle: Vec3,
+    pub radius_m: f32,
+    /// Sum of its normals times their areas, m^2, and the sum of the areas.
+    pub across: Vec3,
+    pub area_m2: f32,
+    /// Numbers of the runs that it consists of.
+    pub parts: Range<u32>,
+}
+
+/// All runs of a scene, by number; those that do not rest have no area.
+#[derive(Default)]
+pub struct FarRuns {
+    pub runs: Vec<FarRun>,
+    /// The largest runs at rest.
+    pub roots: Vec<u32>,
+}
+
+/// What a cluster sees of all that rests: runs and their weights, packed.
+#[derive(Default)]
+pub struct Cut {
+    /// For each of its vertices.
+    pub near: Vec<u32>,
+    /// For its middle.
+    pub far: Vec<u32>,
+}
+
+impl FarRuns {
+    /// The cut for what lies within a sphere.
+    pub fn cut(&self, centre: Vec3, radius_m: f32) -> Cut {
+        let mut cut = Cut::default();
+        self.roots.iter().for_each(|&root| self.cut_below(root, 1.0, (centre, radius_m), &mut cut));
+        cut
+    }
+
+    fn cut_below(&self, number: u32, weight: f32, eye: (Vec3, f32), out: &mut Cut) {
+        let run = &self.runs[number as usize];
+        let across = run.across.length();
+        let (centre, radius_m) = eye;
+        // All of a flat piece faces away.
+        if across > 0.98 * run.area_m2
+            && run.across.dot(centre - run.middle) < -across * (radius_m + 0.2 * run.radius_m)
+        {
+            return;
+        }
+        let gap = (run.middle.distance(centre) - radius_m).max(1e-6);
+        let round = if across < FLAT * run.area_m2 { (run.area_m2 / LEAST_SHARE).sqrt() } else { 0.0 };
+        let size = (run.radius_m / MOST_RADIUS).max(round) / gap;
+        let opened = if run.parts.is_empty() { 0.0 } else { fade(size, [FADE, 1.0]) };
+        if run.area_m2 > 0.0 {
+            let near = 1.0 - fade(gap / radius_m, NEAR);
+            let push = |out: &mut Vec<u32>, weight: f32| {
+                let packed = (weight * WHOLE as f32).round() as u32;
+                out.extend((packed > 0).then_some(packed << RUN_BITS | number));
+            };
+            push(&mut out.near, weight * (1.0 - opened) * near);
+            push(&mut out.far, weight * (1.0 - opened) * (1.0 - near));
+        }
+        if opened > 0.0 {
+            run.parts.clone().for_each(|part| self.cut_below(part, weight * opened, eye, out));
+        }
+    }
+}
+
+fn fade(x: f32, [from, to]: [f32; 2]) -> f32 {
+    ((x - from) / (to - from)).clamp(0.0, 1.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_cut_stands_for_every_smallest_run_once() {
+        // Four large runs of four, along x, 1 m each.
+        let run = |x: f32, width: f32, parts| FarRun {
+            middle: Vec3::X * x,
+            radius_m: width / 2.0,
+            across: Vec3::Y * width,
+            area_m2: width,
+            parts,
+        };
+        let large = (0..4).map(|i| run(i as f32 + 0.5, 1.0, 4 + 4 * i..8 + 4 * i));
+        let small = (0..16).map(|i| run((i as f32 + 0.5) / 4.0, 0.25, 0..0));
+        let tree = FarRuns { runs: large.chain(small).collect(), roots: (0..4).collect() };
+        let mut sizes = Vec::new();
+        for (x, radius) in [(0.3, 0.1), (-0.6, 0.05), (1.7, 0.0), (20.0, 1.0), (-1.2, 0.2), (0.5, 9.0)] {
+            let Cut { near, far } = tree.cut(Vec3::new(x, 0.1, 0.0), radius);
+            let mut covered = [0.0; 16];
+            for entry in near.iter().chain(&far) {
+                let number = entry & ((1 << RUN_BITS) - 1);
+                let weight = f64::from(entry >> RUN_BITS) / f64::from(WHOLE);
+                let under = tree.runs[number as usize].parts.clone();
+                let leaves = if under.is_empty() { number..number + 1 } else { under };
+                leaves.for_each(|leaf| covered[leaf as usize - 4] += weight);
+            }
+            assert!(covered.iter().all(|weight| (weight - 1.0).abs() < 1e-3), "{x}: {covered:?}");
+            sizes.push([near.len(), far.len()]);
+        }
+        assert_eq!([sizes[3], sizes[5]], [[0, 4], [16, 0]], "all large from afar, all small from within");
+        let [near, far] = sizes[0];
+        assert!(near > 0 && far > 0 && near + far < 16, "{sizes:?}");
+    }
+}

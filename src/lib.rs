@@ -44,7 +44,8 @@
 //!   lights, so nothing is baked of it; other flat meshes have fields as all others do. A point within 0.002 bounding radii of its receiver from the
 //!   sheet's plane counts as that far from it, on the side of its receiver's centre ([`field::sheet`]).
 //! - Bounces: every vertex of a rigid group has links to runs of vertices that it sees, and reads the occlusion fields of
-//!   what moves around it for the light that comes from there ([`bounce`]). All that reflects passes its base colour's share of light on as a diffuse surface does, metals too.
+//!   what moves around it for the light that comes from there ([`bounce`]). All that reflects passes its base colour's
+//!   share of light on as a diffuse surface does, metals too.
 //! - Gloss: roughness, metal and a base colour as in glTF ([`gloss`]). The merge leaves the transfer past everything, of
 //!   which the share of a reflected sky follows for any view; bounced light fills the rest of a lobe alike.
 //! - Light: it is linear Rec.709 radiance. The radiosity is B = albedo/pi * integral of L V max(0, n.w) dw.

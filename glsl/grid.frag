@@ -52,7 +52,7 @@ void main() {
     vec3 light = blend(radiosity, triangle, weight);
 #if PIXEL
     uvec2 chain = chain_of(push.cluster_first, first) & uvec2(~0u, ~OWN_MAPS);
-    if (chain.y > 0) {
+    if (chain.y > 0 && has_edge(triangle)) {
         Entity receiver = ENTITY(push.receiver);
         Facing facings[FACINGS];
         facings[0] = facing_of(receiver, push.normal.xyz, 1.0, NONE, 0);

@@ -17,21 +17,22 @@ layout(location = 1) out vec3 at; // object's frame, metres
 
 // A block is thrown away unless a shadow's edge comes near one of its vertices.
 layout(binding = 0) uniform utextureBuffer corners;  // vertices of each cell; see asset::grid
-layout(binding = 1) uniform textureBuffer radiosity; // w: whether an edge is near
+#include "marks.glsl"
+layout(binding = 1) uniform textureBuffer radiosity; // w: marks
 
 bool has_edge(uint block) {
     uint row = (push.cells.x + BLOCK_CELLS - 1) / BLOCK_CELLS;
     uvec2 low = BLOCK_CELLS * uvec2(block % row, block / row);
-    float most = 0.0;
+    uint marks = 0;
     for (uint i = 0; i < (BLOCK_CELLS + 1) * (BLOCK_CELLS + 1); i++) {
         uvec2 vertex = min(low + uvec2(i % (BLOCK_CELLS + 1), i / (BLOCK_CELLS + 1)), push.cells);
         uvec2 cell = min(vertex, push.cells - 1);
         uvec4 corner = texelFetch(corners, int(cell.y * push.cells.x + cell.x));
         uvec2 near = vertex.y > cell.y ? corner.zw : corner.xy;
         uint index = (vertex.x > cell.x ? near.y : near.x) & ~UPWARDS;
-        most = max(most, texelFetch(radiosity, int(push.first + index)).w);
+        marks |= unpack_marks(texelFetch(radiosity, int(push.first + index)).w);
     }
-    return most > 0.0;
+    return marks_edge(marks);
 }
 #endif
 

@@ -19,7 +19,19 @@ uvec2 self_cell(uint i) {
 }
 #include "self_visibility.glsl"
 #endif
+#define STATES 1
 #include "sharp_light.glsl"
+
+// What the vertices of a pixel's triangle say of shadows: returns whether an edge is near, and keeps the rest.
+bool has_edge(uvec3 corners) {
+    uint marks = 0;
+    for (uint i = 0; i < 3; i++) {
+        marks |= unpack_marks(texelFetch(radiosity, int(corners[i])).w);
+    }
+    light_states = marks >> 1;
+    near_occluders = marks >> 1 + 2 * MARKED_LIGHTS;
+    return marks_edge(marks);
+}
 
 // The chain of the cluster that vertex `v` of an entity belongs to.
 uvec2 chain_of(uint cluster_first, uint v) {

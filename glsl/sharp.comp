@@ -57,7 +57,8 @@ void main() {
         sum.rgb += sharp_sum(surface, cluster.entry_first, cluster.sharp_count) * receiver.albedo;
     }
 #if EDGES
-    sum.w = EDGE_STEPS * EDGE_STEPS * albedo * missed > albedo * open_light + soft ? 1.0 : 0.0;
+    bool is_near = EDGE_STEPS * EDGE_STEPS * albedo * missed > albedo * open_light + soft;
+    sum.w = pack_marks(is_near, light_states, near_occluders);
 #endif
     radiosity[cluster.radiosity_first + v] = sum;
 #if SHOWN

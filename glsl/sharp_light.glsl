@@ -28,6 +28,13 @@ float missed = 0.0; // most, over all lights, of the square of `finest` times th
 float open_light = 0.0; // of all lights, nothing between
 #endif
 
+#if EDGES || STATES
+#include "marks.glsl"
+// Of a vertex, or of all vertices of a triangle.
+uint light_states = 0;
+uint near_occluders = 0;
+#endif
+
 // Which way a vertex faces, and what its own mesh leaves of its view.
 struct Facing {
     vec3 normal;  // world
@@ -265,6 +272,12 @@ bool may_block(uint packed, Surface surface) {
     if ((packed & ENTRY_LIGHT) != 0) {
         return false;
     }
+#if STATES
+    uint state = light_states >> state_bit(chain_light(packed)) & 3;
+    if (state == OPEN || state == DARK || (near_occluders & occluder_bit(packed & SKY_CHAIN)) == 0) {
+        return false;
+    }
+#endif
     vec4 shining = ENTITY(chain_light(packed)).centre, ball = ENTITY(packed & SKY_CHAIN).centre;
     vec3 from = surface.origin + surface.position;
     vec3 to_light = shining.xyz - from, to_ball = ball.xyz - from;
@@ -311,8 +324,9 @@ vec3 chain_sum(Surface surface, Entity shining, bool open, uint first, uint coun
     open_share = 0.0;
 #endif
 #if EDGES
-    float unblocked = 0.0;
-    finest = 0.0;
+    float unblocked = 0.0, passed = 0.0;
+    float nearest = 0.0; // `finest` of all occluders
+    bool hidden = !open; // every block behind one occluder whose own edges are far
 #endif
     // Loops are tested at their ends, as in the merge.
     do {
@@ -324,9 +338,22 @@ vec3 chain_sum(Surface surface, Entity shining, bool open, uint first, uint coun
         if (!open) {
             j = i;
             uint packed = entry_at(first + j);
+#if EDGES
+            bool covered = false;
+#endif
             do {
                 if (has_outline(packed)) {
-                    share *= let_through(ENTITY(packed & SKY_CHAIN), surface, light, block, true);
+#if EDGES
+                    finest = 0.0;
+#endif
+                    vec4 free = let_through(ENTITY(packed & SKY_CHAIN), surface, light, block, true);
+                    share *= free;
+#if EDGES
+                    bool matters = finest > 0.0 || free != vec4(1.0);
+                    near_occluders |= matters ? occluder_bit(packed & SKY_CHAIN) : 0;
+                    covered = covered || (finest == 0.0 && free == vec4(0.0));
+                    nearest = max(nearest, finest);
+#endif
                     j = next_entry(surface, first, count, j + 1, true);
                     packed = entry_at(first + j);
                 }
@@ -346,8 +373,17 @@ vec3 chain_sum(Surface surface, Entity shining, bool open, uint first, uint coun
                 }
             } while (is_sheet(packed) && j < count);
             share *= shadow.free;
+#if EDGES
+            nearest = max(nearest, finest);
+#endif
+#endif
+#if EDGES
+            hidden = hidden && covered;
 #endif
         }
+#if EDGES
+        passed += dot(share, vec4(1.0));
+#endif
         vec4 shines = vec4(shining.light_kind == LIGHT_BALL ? shining.light_share : 1.0);
 #if OUTLINES
         if (!open) {
@@ -363,8 +399,11 @@ vec3 chain_sum(Surface surface, Entity shining, bool open, uint first, uint coun
     float ramp = ramp_of(light, shining), cone = clamp(ramp, 0.0, 1.0);
     cone *= cone;
 #if EDGES
+    finest = hidden ? 0.0 : nearest;
     find_rim(ramp, shining, surface.step / max(light.distance, 1e-30));
     add_open(unblocked, cone, shining);
+    uint state = finest > 0.0 ? CUT : passed >= 0.999 * unblocked ? OPEN : passed <= 0.001 * unblocked ? DARK : CUT;
+    light_states |= state << state_bit(chain_light(entry_at(first + j)));
 #endif
 #if SHOWN
     note_share(chain_light(entry_at(first + j)), irradiance * cone);
@@ -386,7 +425,12 @@ vec3 open_sum(Surface surface, uint first, uint count) {
             i += ends ? 0 : 1;
         } while (!ends);
         Entity shining = ENTITY(chain_light(entry_at(first + i)));
-        if (open && !has_own_outline(shining)) {
+#if STATES
+        bool dark = (light_states >> state_bit(chain_light(entry_at(first + i))) & 3) == DARK;
+#else
+        const bool dark = false;
+#endif
+        if (open && !dark && !has_own_outline(shining)) {
             sum += chain_sum(surface, shining, true, first, count, i);
         } else {
             i++;

@@ -43,7 +43,7 @@ void main() {
     uvec2 chain = chain_of(push.cluster_first, nearest);
     bool own_maps = (chain.y & OWN_MAPS) != 0;
     chain.y &= ~OWN_MAPS;
-    if (chain.y > 0) {
+    if (chain.y > 0 && has_edge(lit)) {
         Entity receiver = ENTITY(push.receiver);
         Facing facings[FACINGS];
         [[unroll]] for (uint i = 0; i < FACINGS; i++) {

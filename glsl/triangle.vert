@@ -12,7 +12,8 @@ layout(binding = 11) uniform utextureBuffer paints; // the bits of three numbers
 #endif
 
 layout(binding = 0) uniform utextureBuffer corners;   // vertices of triangles, three each
-layout(binding = 1) uniform textureBuffer radiosity;  // w: whether an edge is near
+#include "marks.glsl"
+layout(binding = 1) uniform textureBuffer radiosity;  // w: marks
 layout(binding = 8) uniform textureBuffer vertices;   // position and normal of each
 layout(binding = 9) uniform utextureBuffer emissions; // the bits of three numbers a vertex
 #include "triangle_push.glsl"
@@ -50,10 +51,10 @@ void main() {
 #if GLOSS
     pass_gloss(push.receiver, own);
 #endif
-    float edge = 0.0;
+    uint marks = 0;
     for (int i = 0; i < 3; i++) {
-        edge = max(edge, texelFetch(radiosity, int(push.first + triangle[i])).w);
+        marks |= unpack_marks(texelFetch(radiosity, int(push.first + triangle[i])).w);
     }
     vec4 places[3] = vec4[3](clip_place(triangle.x), clip_place(triangle.y), clip_place(triangle.z));
-    gl_Position = edge > 0.0 && !is_small(places[0], places[1], places[2]) ? places[corner] : vec4(0.0, 0.0, 0.0, 1.0);
+    gl_Position = marks_edge(marks) && !is_small(places[0], places[1], places[2]) ? places[corner] : vec4(0.0, 0.0, 0.0, 1.0);
 }

@@ -339,6 +339,10 @@ pub const HAS_HALVES: u32 = 1 << 31;
 /// Flag of the number of a cluster's entries, for pixels: only maps of its own vertices go with them, as those of
 /// neighbouring clusters have other shadows.
 pub const OWN_MAPS: u32 = 1 << 31;
+/// Lights and occluders that the marks of a vertex keep apart: `glsl/marks.glsl`. Those whose numbers leave the same rest
+/// share bits.
+const MARKED_LIGHTS: u32 = 8;
+const MARKED_OCCLUDERS: u32 = 13;
 /// Bits of a lattice's factors (see [`crate::field::Fit::packed`]).
 pub const FIT_BITS: u32 = 21;
 /// How far apart tags of entities are in a picture's alpha: as 8 bits tell.
@@ -347,7 +351,7 @@ pub const TAG_STEP: f32 = 1.0 / 255.0;
 pub const COSINE_LOBE: [f64; 3] = [0.09375, 0.5, 0.46875];
 
 /// The macros that every shader has: what both languages have to agree on.
-pub fn shared_macros() -> [(&'static str, String); 12] {
+pub fn shared_macros() -> [(&'static str, String); 14] {
     let [a, b, c] = COSINE_LOBE;
     let kind = |kind: LightKind| format!("{}u", kind as u32);
     [
@@ -356,6 +360,8 @@ pub fn shared_macros() -> [(&'static str, String); 12] {
         ("UPWARDS", format!("{UPWARDS:#x}u")),
         ("HAS_HALVES", format!("{HAS_HALVES:#x}u")),
         ("OWN_MAPS", format!("{OWN_MAPS:#x}u")),
+        ("MARKED_LIGHTS", format!("{MARKED_LIGHTS}u")),
+        ("MARKED_OCCLUDERS", format!("{MARKED_OCCLUDERS}u")),
         ("FIT_BITS", FIT_BITS.to_string()),
         ("TAG_STEP", format!("{TAG_STEP:?}")),
         ("COSINE_LOBE", format!("vec3({a:?}, {b:?}, {c:?})")),

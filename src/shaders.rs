@@ -47,6 +47,7 @@ embedded!(
     "grid.vert",
     "holes.glsl",
     "lists.glsl",
+    "marks.glsl",
     "merge.comp",
     "merge_cap.glsl",
     "merge_cone.glsl",

@@ -1,0 +1,28 @@
+// What a vertex says of shadows around it, for pixels of its triangles: whether an edge is near that its light shows
+// badly; how the shadows of each light stand, two bits for lights whose numbers leave the same rest; and a bit for
+// occluders that take any of a light or whose edges are near, shared alike. It is kept as a float that is neither
+// denormal nor NaN, which no addition of 0 changes.
+const uint OPEN = 1, DARK = 2, CUT = 3; // open to all of a light, hidden from it, or near an edge; 0 where it is not listed
+
+uint state_bit(uint light) {
+    return 2 * (light % MARKED_LIGHTS);
+}
+
+uint occluder_bit(uint occluder) {
+    return 1u << occluder % MARKED_OCCLUDERS;
+}
+
+float pack_marks(bool edge, uint lights, uint occluders) {
+    uint bits = (edge ? 1u : 0u) | lights << 1 | occluders << 1 + 2 * MARKED_LIGHTS;
+    // Six of thirty bits lie in the middle of the exponent, whose first is set and whose last is not.
+    return uintBitsToFloat((bits & 0x7fffff) | (bits >> 23 & 63) << 24 | (bits >> 29) << 31 | 1u << 30);
+}
+
+uint unpack_marks(float packed) {
+    uint bits = floatBitsToUint(packed);
+    return packed == 0.0 ? 0 : (bits & 0x7fffff) | (bits >> 24 & 63) << 23 | (bits >> 31) << 29;
+}
+
+bool marks_edge(uint marks) {
+    return (marks & 1) != 0;
+}

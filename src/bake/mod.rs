@@ -1,7 +1,7 @@
 //! The bake makes the field and the transfer vectors of a mesh. Everything that shows a scene calls [`ensure()`].
 //!
 //! ```text
-//! samples -> capture -> project -> assemble -> field
+//! samples -> capture -> project -> assemble -> field  (of convex solids of few faces: samples -> closed form -> assemble)
 //! group -> refine -> rays -> surfaces with transfer vectors and self-visibility
 //! ```
 //!
@@ -29,6 +29,7 @@ mod names;
 mod options;
 pub mod own_visibility;
 mod packet;
+mod polyhedron;
 pub mod project;
 mod quality;
 pub mod raster;
@@ -45,6 +46,7 @@ use crate::error::{Error, Result};
 use crate::field::quantity::FieldKind;
 use crate::field::{FieldHeader, ShadowField, growth};
 use crate::gpu::{Access, Buffer, BufferKind, Commands, Device, Timing};
+use crate::sh::polygon::POLYGON_BANDS;
 use crate::shaders::Library;
 use assemble::{Assemble, Sources};
 use batch::Batches;
@@ -52,6 +54,7 @@ pub use ensure::{BakedMesh, BakedScene, SceneNeeds, bakes_transfer, ensure, need
 use levels::Leveled;
 use model::Model;
 pub use options::{Options, Quality, first_shell, hash_text, header};
+use polyhedron::Polyhedron;
 pub use quality::BakeOptions;
 use samples::FieldSamples;
 use serde::Serialize;
@@ -157,17 +160,18 @@ impl Baker {
         self.fits(&header)?;
         let started = Instant::now();
         triangles::tell_repeated(mesh);
-        // They take about equally long, each mostly on one thread, so they are made side by side.
         let radiance = header.kind == FieldKind::Radiance;
-        let make_model = || match header.kind {
-            FieldKind::Radiance => Model::with_colors(&self.device, mesh),
-            FieldKind::Occlusion => self.model(mesh, header.level_texels),
-        };
-        let (samples, model) = rayon::join(|| FieldSamples::new(mesh, &header.lattice), make_model);
-        let FieldSamples { captured, inside_count, sources } = samples?;
+        let closed_form = !radiance && header.bands <= POLYGON_BANDS;
         let mut report = BakeReport::default();
-        let batches = Batches::new(&self.device, &self.library, model?, &header)?;
-        let coefficients = batches.run(&captured, &mut report, progress)?;
+        let (samples, coefficients) = match closed_form.then(|| Polyhedron::new(mesh)).flatten() {
+            Some(solid) => {
+                let samples = FieldSamples::new(mesh, &header.lattice)?;
+                let coefficients = solid.coefficients(&samples.captured, header.bands, header.sample_stride());
+                (samples, coefficients)
+            }
+            None => self.capture(mesh, &header, &mut report, progress)?,
+        };
+        let FieldSamples { captured, inside_count, sources } = samples;
 
         let stride = header.sample_stride();
         let mut values = vec![0.0_f32; header.lattice.sample_count() as usize * stride];
@@ -189,6 +193,26 @@ impl Baker {
         report.samples = field.header.lattice.sample_count() - inside_count;
         report.total = started.elapsed();
         Ok((field, report))
+    }
+
+    /// The samples of a field and their coefficients, captured.
+    fn capture(
+        &self,
+        mesh: &Mesh,
+        header: &FieldHeader,
+        report: &mut BakeReport,
+        progress: Progress<'_>,
+    ) -> Result<(FieldSamples, Vec<f32>)> {
+        let make_model = || match header.kind {
+            FieldKind::Radiance => Model::with_colors(&self.device, mesh),
+            FieldKind::Occlusion => self.model(mesh, header.level_texels),
+        };
+        // They take about equally long, each mostly on one thread, so they are made side by side.
+        let (samples, model) = rayon::join(|| FieldSamples::new(mesh, &header.lattice), make_model);
+        let samples = samples?;
+        let batches = Batches::new(&self.device, &self.library, model?, header)?;
+        let coefficients = batches.run(&samples.captured, report, progress)?;
+        Ok((samples, coefficients))
     }
 
     /// The payload of a field from its captured samples, which are put into the stored order and number format.

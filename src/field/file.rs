@@ -23,7 +23,7 @@ pub const FIELD_MAGIC: [u8; 8] = *b"SHFIELD\n";
 /// First bytes of a cached file of surfaces.
 pub const SURFACES_MAGIC: [u8; 8] = *b"SHSURFA\n";
 /// Version that this program writes and reads. It increases whenever the meaning of header or payload changes.
-pub const VERSION: u32 = 10;
+pub const VERSION: u32 = 11;
 /// Longest header that is read.
 const HEADER_LIMIT: u64 = 64 << 10;
 /// Largest payload that is read: 4 GiB.

@@ -124,7 +124,9 @@ fn a_bake_is_timed_pass_by_pass() {
         return;
     }
     let folder = tempfile::tempdir().unwrap();
-    let solid = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n";
+    // Dented, so that its field is captured.
+    let solid = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0.2 0.2 1\nv 0.2 0.2 0.3\n\
+        f 1 2 4\nf 2 3 4\nf 3 1 4\nf 2 1 5\nf 3 2 5\nf 1 3 5\n";
     std::fs::write(folder.path().join("solid.obj"), solid).unwrap();
     let document = json(folder.path(), &["--bake", "solid.obj", "--runs", "1"]);
     let rows = document["passes"].as_array().unwrap();

@@ -5,10 +5,8 @@
 //! light and albedo times the light along its links. That is Jacobi's iteration of the radiosity equation: each step adds
 //! a bounce.
 //!
-//! Between groups light goes by [`movers`]: what moves reflects onto everything by its occlusion field, and receives
-//! from larger runs of all that rests, as flat pieces seen from afar with nothing between; where they take more than the
-//! hemisphere, as furniture before a wall does, they are scaled down to it. The first steps are without it, as it needs
-//! the light that they bring. Only fronts reflect. A lamp in spherical harmonics inside a closed mesh lights nothing of
+//! Between groups light goes by [`movers`], in the last two steps, as it needs the light that those before bring. There
+//! are no more steps than are seen, which follows from the links and the albedos. Only fronts reflect. A lamp in spherical harmonics inside a closed mesh lights nothing of
 //! it, as the mesh's transfer ends where its own far side blocks; a sharp one does.
 
 pub mod movers;

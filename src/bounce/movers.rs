@@ -1,18 +1,21 @@
-//! Light that bounces between rigid groups: passes "lobes" and "movers".
+//! Light that bounces between rigid groups: passes "outgoing" and "movers".
 //!
-//! A thing that moves has six lobes, one for each direction of its axes: the mean light that leaves its vertices, by how
-//! much they face that way, and where they are. Every vertex near it reads its occlusion field, which holds the very
-//! outline: its product with the cosine lobe of the vertex is the share of the view that the thing takes, and the light
-//! of the lobes that face the vertex comes from there. The same share is taken from what the vertex's own group reflects
-//! onto it. What moves sees all that rests as flat pieces, with nothing between.
+//! A vertex reads the occlusion field of everything near it that moves: its product with the cosine lobe of the vertex is
+//! the share of the view that the thing takes, and so much of what the vertex's own group reflects is lost. The light
+//! that comes from there instead is the mean of those surfaces of the thing that face the vertex. The light that leaves
+//! it and its area, both by direction, are nine SH coefficients each, the light of its runs of vertices times a cosine
+//! lobe; their quotient towards the vertex is that mean. (Means of six sides were too bright below what is lit from
+//! above.) How much of it the vertex sees past its own group say its map of self-visibility, or else its transfer.
+//!
+//! What moves sees all that rests as flat discs with nothing between: a cut of a tree of runs ([`crate::lists::far`]).
 
 use super::{LinkedEntity, read};
-use crate::bake::links::{RUNS, Runs};
+use crate::bake::links::{RUN_BITS, RUNS, Runs, WHOLE_SHARE};
 use crate::error::Result;
 use crate::field::self_visibility;
 use crate::gpu::{Access, Bind, Buffer, Commands, ComputePipeline, Device, Upload};
 use crate::layout::CLUSTER_VERTICES;
-use crate::lists::far::{FarRun, FarRuns, RUN_BITS, WHOLE};
+use crate::lists::far::{FarRun, FarRuns};
 use crate::lists::incremental::{CUT_HEADER, ClusterLists, Reflectors};
 use crate::merge::MergeInputs;
 use crate::merge::variant::MergePermutation;
@@ -258,7 +261,7 @@ fn far_row(permutation: &MergePermutation, file: &'static str) -> ShaderPermutat
     permutation
         .row_of(file)
         .define("RUN_BITS", RUN_BITS)
-        .number("WHOLE_SHARE", f64::from(WHOLE))
+        .number("WHOLE_SHARE", f64::from(WHOLE_SHARE))
         .number("OVER", OVER)
         .number("SMOOTH", SMOOTH)
 }

@@ -6,7 +6,6 @@ use crate::bake::links::{RUN_BITS, WHOLE_SHARE};
 use crate::error::Result;
 use crate::field::self_visibility;
 use crate::layout::Cluster;
-use crate::lists::far::WHOLE;
 use crate::lists::incremental::CUT_HEADER;
 use crate::lists::skip::Skip;
 use crate::merge::twin::{Cone, MergeObject};
@@ -224,7 +223,7 @@ impl Movers {
         let to = run.middle.as_dvec3() - place;
         let area = f64::from(run.across.length());
         let axis = run.across.as_dvec3() / area.max(1e-20);
-        let weight = f64::from(entry >> RUN_BITS) / f64::from(WHOLE);
+        let weight = f64::from(entry >> RUN_BITS) / f64::from(WHOLE_SHARE);
         SeenRun { number, weight, to, axis, area, height: (-to.dot(axis)).max(0.0) }
     }
 }

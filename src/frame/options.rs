@@ -26,7 +26,7 @@ pub struct Options {
     /// Light that the merge leaves out: contributions to a vertex that are bounded below this share of the radiance
     /// that the scene's exposure shows as white; 0 leaves none out.
     pub eps: f32,
-    /// How often light bounces between what never moves against each other.
+    /// How often light bounces from surface to surface.
     #[serde(default)]
     pub bounces: Bounces,
     /// Whether light that microfacets pass on to each other is lost, as in glTF's model.
@@ -113,7 +113,7 @@ pub struct RenderOptions {
         arg(long, help_heading = LIGHTING, value_enum, default_value = "sharp", value_name = "sh|sharp")
     )]
     pub lights: Lights,
-    /// How often light bounces between surfaces that never move against each other
+    /// How often light bounces from surface to surface
     #[cfg_attr(
         feature = "cli",
         arg(long, help_heading = LIGHTING, value_enum, default_value = "all", value_name = "0|1|all")

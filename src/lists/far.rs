@@ -2,6 +2,7 @@
 //!
 //! A cluster of vertices sees near pieces vertex by vertex, and far ones from its middle, as SH for all its vertices.
 
+use crate::bake::links::{RUN_BITS, WHOLE_SHARE};
 use glam::Vec3;
 use std::ops::Range;
 
@@ -16,11 +17,6 @@ const FADE: f32 = 0.85;
 /// A run nearer to a cluster than so many of the cluster's radii is seen by each of its vertices, and from the second
 /// on by its middle alone.
 const NEAR: [f32; 2] = [1.5, 2.0];
-/// Bits of the number of a run in an entry, below those of its weight.
-pub const RUN_BITS: u32 = 20;
-/// The weight that all bits above those stand for.
-pub const WHOLE: u32 = (1 << (32 - RUN_BITS)) - 1;
-
 /// A run at rest.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct FarRun {
@@ -42,7 +38,7 @@ pub struct FarRuns {
     pub roots: Vec<u32>,
 }
 
-/// What a cluster sees of all that rests: runs and their weights, packed.
+/// What a cluster sees of all that rests: runs below their weights, packed as links are ([`RUN_BITS`]).
 #[derive(Default)]
 pub struct Cut {
     /// For each of its vertices.
@@ -76,7 +72,7 @@ impl FarRuns {
         if run.area_m2 > 0.0 {
             let near = 1.0 - fade(gap / radius_m, NEAR);
             let push = |out: &mut Vec<u32>, weight: f32| {
-                let packed = (weight * WHOLE as f32).round() as u32;
+                let packed = (weight * WHOLE_SHARE as f32).round() as u32;
                 out.extend((packed > 0).then_some(packed << RUN_BITS | number));
             };
             push(&mut out.near, weight * (1.0 - opened) * near);
@@ -115,7 +111,7 @@ mod tests {
             let mut covered = [0.0; 16];
             for entry in near.iter().chain(&far) {
                 let number = entry & ((1 << RUN_BITS) - 1);
-                let weight = f64::from(entry >> RUN_BITS) / f64::from(WHOLE);
+                let weight = f64::from(entry >> RUN_BITS) / f64::from(WHOLE_SHARE);
                 let under = tree.runs[number as usize].parts.clone();
                 let leaves = if under.is_empty() { number..number + 1 } else { under };
                 leaves.for_each(|leaf| covered[leaf as usize - 4] += weight);

@@ -37,7 +37,7 @@ name = "floor"
 plane = { size_m = 4, cells = 2 }
 [[mesh]]
 name = "ball"
-sphere = { radius_m = 0.6, subdivisions = 0 }
+sphere = { radius_m = 0.6, subdivisions = 1 }
 [[entity]]
 mesh = "floor"
 position = [0, -0.6, 0]
@@ -51,7 +51,9 @@ emission = [30, 24, 12]
 motion = [{ spin = { period_s = 3 } }, { bob = { amplitude_m = 0.2, period_s = 1 } }]
 "#;
 
-const MESH: &str = "v 0 0 0 1 0 0\nv 1 0 0 0 1 0\nv 0 1 0 0 0 1\nv 0 0 1 1 1 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 1 4 3\n";
+/// Dented, so that its field is captured.
+const MESH: &str = "v 0 0 0 1 0 0\nv 1 0 0 0 1 0\nv 0 1 0 0 0 1\nv 0.2 0.2 1 1 1 1\nv 0.2 0.2 0.3 1 1 1\n\
+    f 1 2 4\nf 2 3 4\nf 3 1 4\nf 2 1 5\nf 3 2 5\nf 1 3 5\n";
 
 /// Few samples of few texels.
 const SMALL: [&str; 6] = ["--lattice", "cube:2x3", "--face-px", "4", "--quality", "draft"];

@@ -171,7 +171,7 @@ impl Assemble {
     /// A pipeline that stores `storage`.
     pub fn new(device: &Arc<Device>, library: &Library, storage: Storage) -> Result<Self> {
         let shader = library.shader(&Self::row(storage))?;
-        Ok(Assemble { pipeline: ComputePipeline::new(device, "assemble", &shader, &[])? })
+        Ok(Assemble { pipeline: ComputePipeline::new(device, "assemble", &shader)? })
     }
 
     /// Writes `stored_count` samples of `sample_quads` quads, each multiplied by `factor`, into a byte range of

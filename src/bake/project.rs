@@ -81,7 +81,7 @@ impl Project {
         columns: u32,
     ) -> Result<Self> {
         let shader = library.shader(&Self::row(bands, kind))?;
-        let pipeline = ComputePipeline::new(device, "project", &shader, &[])?;
+        let pipeline = ComputePipeline::new(device, "project", &shader)?;
         let texels = Buffer::with_data(device, "project texels", &texel_table(face_px as usize))?;
         if !TexelView::fits(device, TEXEL_FORMAT, texels.size_bytes) {
             let most = device.limits.max_texel_buffer_elements;

@@ -120,7 +120,7 @@ impl Raster {
 
     /// The pipeline for an atlas of `columns` by `columns` faces of `face_px`.
     pub(super) fn new(device: &Arc<Device>, library: &Library, face_px: u32, columns: u32) -> Result<Self> {
-        let pipeline = ComputePipeline::new(device, "capture", &library.shader(&Self::row())?, &[])?;
+        let pipeline = ComputePipeline::new(device, "capture", &library.shader(&Self::row())?)?;
         let bytes = u64::from(columns * face_px).pow(2);
         let texels = Buffer::new(device, "capture texels", BufferKind::Device, bytes)?;
         Ok(Raster { pipeline, texels, face_px, columns })

@@ -196,7 +196,7 @@ impl Silhouette {
         };
         let vertex = library.shader(&vertex)?;
         let fragment = library.shader(&fragment)?;
-        let reduce = |name, row| ComputePipeline::new(device, name, &library.shader(row)?, &[]);
+        let reduce = |name, row| ComputePipeline::new(device, name, &library.shader(row)?);
         let bytes = 4 * u64::from(atlas_columns * atlas_columns) * u64::from(map_px) * u64::from(2 * view_px - 1);
         Ok(Silhouette {
             view: GraphicsPipeline::new(device, "silhouette", &vertex, &fragment, state)?,

@@ -51,7 +51,7 @@ pub fn measure(device: &Arc<Device>, library: &Library, field_bytes: u64) -> Res
             .define("READS", READS)
             .define("ROUNDS", rounds)
             .define("MASK", mask);
-        let pipeline = ComputePipeline::new(device, "ceiling", &library.shader(&row)?, &[])?;
+        let pipeline = ComputePipeline::new(device, "ceiling", &library.shader(&row)?)?;
         let view = match kind {
             1 => Some(TexelView::new(&source, vk::Format::R16G16B16A16_SFLOAT)?),
             2 => Some(TexelView::new(&source, vk::Format::R32G32B32A32_UINT)?),
@@ -81,7 +81,7 @@ fn triad(device: &Arc<Device>, library: &Library, out: &Buffer) -> Result<f64> {
     let b = Buffer::with_data(device, "ceiling b", &ones)?;
     let c = Buffer::with_data(device, "ceiling c", &ones)?;
     let row = ShaderPermutation::new("ceiling.comp", 4).define("KIND", 4_u32);
-    let pipeline = ComputePipeline::new(device, "ceiling", &library.shader(&row)?, &[])?;
+    let pipeline = ComputePipeline::new(device, "ceiling", &library.shader(&row)?)?;
     let resources = [Bind::Buffer(&b), Bind::Buffer(out), Bind::Buffer(&c)];
     Ok(3.0 * bytes as f64 / best(device, &pipeline, &resources, TRIAD_FLOATS / 4)? * 1e-9)
 }
@@ -93,7 +93,7 @@ fn idle(device: &Arc<Device>, library: &Library, source: &Buffer, out: &Buffer) 
         .define("READS", 1_u32)
         .define("ROUNDS", 1_u32)
         .define("MASK", 7_u32);
-    let pipeline = ComputePipeline::new(device, "ceiling", &library.shader(&row)?, &[])?;
+    let pipeline = ComputePipeline::new(device, "ceiling", &library.shader(&row)?)?;
     Ok(1e3 * best(device, &pipeline, &[Bind::Buffer(source), Bind::Buffer(out)], 1)?)
 }
 

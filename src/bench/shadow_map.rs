@@ -149,7 +149,7 @@ impl ShadowMaps {
                 &library.shader(&fragment)?,
                 state,
             )?,
-            shade: ComputePipeline::new(device, "shadow map light", &library.shader(&shade)?, &[])?,
+            shade: ComputePipeline::new(device, "shadow map light", &library.shader(&shade)?)?,
             map_px,
             color: image("shadow map", state.color)?,
             depth: image("shadow map depth", vk::Format::D32_SFLOAT)?,

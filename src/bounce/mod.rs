@@ -232,8 +232,7 @@ impl Bounce {
             && TexelView::fits(device, vk::Format::R32G32B32A32_SFLOAT, 16 * u64::from(counts[1]));
         let texels = merge.reads_texels() && fits;
         let meets = linked.meets();
-        let pipeline =
-            |name: &str, row: ShaderPermutation| ComputePipeline::new(device, name, &library.shader(&row)?, &[]);
+        let pipeline = |name: &str, row: ShaderPermutation| ComputePipeline::new(device, name, &library.shader(&row)?);
         let Linked { surfaces, far, ranges, .. } = linked;
         let movers = || Movers::new(device, library, (surfaces, far), merge, self_shadows, ranges.len());
         Ok(Bounce {

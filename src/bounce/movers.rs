@@ -149,8 +149,7 @@ impl Movers {
         self_shadows: bool,
         vertices: usize,
     ) -> Result<Self> {
-        let pipeline =
-            |name: &str, row: ShaderPermutation| ComputePipeline::new(device, name, &library.shader(&row)?, &[]);
+        let pipeline = |name: &str, row: ShaderPermutation| ComputePipeline::new(device, name, &library.shader(&row)?);
         // No buffer is empty.
         let buffer = |name: &str, quads: &[[f32; 4]]| match quads {
             [] => Buffer::zeros(device, name, 16),

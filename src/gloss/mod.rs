@@ -171,7 +171,7 @@ impl Reflections {
         let mut shown_lights = vec![NO_LIGHTS; entity_count];
         glossy.iter().for_each(|of| shown_lights[of.entity] = of.lights);
         Ok(Reflections {
-            pipeline: ComputePipeline::new(device, "gloss", &library.shader(&gloss_row(texels))?, &[])?,
+            pipeline: ComputePipeline::new(device, "gloss", &library.shader(&gloss_row(texels))?)?,
             texels,
             sky: FilteredSky::new(device, environment)?,
             lobes: texture(device, "lobes", lobe::TABLE as u32, &lobe::texels())?,
@@ -192,7 +192,7 @@ impl Reflections {
     pub fn rebuild(&mut self, library: &Library) -> Result<()> {
         let device = self.groups.device().clone();
         let shader = library.shader(&gloss_row(self.texels))?;
-        self.pipeline = ComputePipeline::new(&device, "gloss", &shader, &[])?;
+        self.pipeline = ComputePipeline::new(&device, "gloss", &shader)?;
         Ok(())
     }
 

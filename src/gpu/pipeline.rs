@@ -5,7 +5,7 @@ use super::device::Device;
 use super::reflect::{Binding, BindingKind, VertexInput};
 use super::shader::{Shader, Stage};
 use super::{Checked, limits};
-use crate::error::{Error, Result};
+use crate::error::Result;
 use ash::vk;
 use std::sync::Arc;
 
@@ -142,27 +142,15 @@ pub struct ComputePipeline {
 }
 
 impl ComputePipeline {
-    /// Builds the pipeline; `constants` sets specialisation constants by the name they have in the source.
-    pub fn new(device: &Arc<Device>, name: &str, shader: &Shader, constants: &[(&str, u32)]) -> Result<Self> {
+    /// Builds the pipeline.
+    pub fn new(device: &Arc<Device>, name: &str, shader: &Shader) -> Result<Self> {
         let layout = Layout::new(device, name, &[shader])?;
         let local_size = shader.reflection.local_size;
-        let mut entries = Vec::new();
-        let mut data = Vec::new();
-        for (wanted, value) in constants {
-            let constant = shader.reflection.constants.iter().find(|c| c.name == *wanted).ok_or_else(|| {
-                Error::Failed(format!("{name}: {} has no specialisation constant \"{wanted}\"", shader.name))
-            })?;
-            let offset = (entries.len() * 4) as u32;
-            entries.push(vk::SpecializationMapEntry { constant_id: constant.id, offset, size: 4 });
-            data.extend_from_slice(&value.to_ne_bytes());
-        }
-        let specialization = vk::SpecializationInfo::default().map_entries(&entries).data(&data);
         let module = Module::new(device, shader)?;
         let stage = vk::PipelineShaderStageCreateInfo::default()
             .stage(vk::ShaderStageFlags::COMPUTE)
             .module(module.1)
-            .name(c"main")
-            .specialization_info(&specialization);
+            .name(c"main");
         let create = vk::ComputePipelineCreateInfo::default().stage(stage).layout(layout.pipeline);
         let _compiling = Compiling::new("pipeline", name);
         // SAFETY: everything that `create` points to outlives the call; destroyed by `PipelineHandle`.

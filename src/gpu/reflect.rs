@@ -1,4 +1,4 @@
-//! Reflection of a SPIR-V module: bindings, push constants, local size, specialisation constants, vertex inputs and the
+//! Reflection of a SPIR-V module: bindings, push constants, local size, vertex inputs and the
 //! layout of every struct.
 
 use crate::error::{Error, Result};
@@ -37,15 +37,6 @@ pub struct Binding {
     pub block_bytes: u32,
 }
 
-/// One specialisation constant.
-#[derive(Clone, Debug)]
-pub struct Constant {
-    /// Name in the source.
-    pub name: String,
-    /// `constant_id`.
-    pub id: u32,
-}
-
 /// One vertex attribute.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct VertexInput {
@@ -69,8 +60,6 @@ pub struct Reflection {
     pub shared_bytes: u32,
     /// Workgroup size of a compute shader.
     pub local_size: [u32; 3],
-    /// Specialisation constants.
-    pub constants: Vec<Constant>,
     /// Vertex inputs by location; empty for other stages.
     pub inputs: Vec<VertexInput>,
     /// Struct name to member offsets.
@@ -194,9 +183,6 @@ impl<'m> Reader<'m> {
                 }
                 Op::Variable => self.variable(result, instruction, &mut out)?,
                 _ => {}
-            }
-            if let Some(constant) = self.decoration(result, Decoration::SpecId) {
-                out.constants.push(Constant { name: self.name(result).to_owned(), id: literal(constant.first()) });
             }
             let is_size = instruction.class.opcode == Op::SpecConstantComposite
                 && matches!(

@@ -70,7 +70,7 @@ pub struct Merge {
 
 impl Merge {
     pub fn new(device: &Arc<Device>, library: &Library, permutation: MergePermutation) -> Result<Self> {
-        Ok(Merge { pipeline: ComputePipeline::new(device, "merge", &library.shader(&permutation.row())?, &[])? })
+        Ok(Merge { pipeline: ComputePipeline::new(device, "merge", &library.shader(&permutation.row())?)? })
     }
 
     /// Lights the first `cluster_count` clusters.

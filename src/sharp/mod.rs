@@ -185,7 +185,7 @@ pub struct Sharp {
 
 impl Sharp {
     pub fn new(device: &Arc<Device>, library: &Library, permutation: SharpPermutation) -> Result<Self> {
-        let pipeline = ComputePipeline::new(device, "sharp", &library.shader(&permutation.row())?, &[])?;
+        let pipeline = ComputePipeline::new(device, "sharp", &library.shader(&permutation.row())?)?;
         Ok(Sharp { pipeline, permutation })
     }
 

@@ -157,7 +157,7 @@ fn entities_and_clusters_read_from_texels() {
     let library = Library { shader_dir: Some(folder.path().to_path_buf()), ..gpu.library.clone() };
     let row = ShaderPermutation::new("structs.comp", 4).define("TEXEL", 1u32).define("UNIFORM", 0u32);
     let shader = library.shader(&row.define("ENTRY_BITS", ENTRY_BITS)).unwrap();
-    let pipeline = ComputePipeline::new(&gpu.device, "structs", &shader, &[]).unwrap();
+    let pipeline = ComputePipeline::new(&gpu.device, "structs", &shader).unwrap();
     let (entities, clusters) = (counted::<Entity>(), counted::<Cluster>());
     let upload = |bytes: &[u8]| Buffer::with_data(&gpu.device, "structs", bytes).unwrap();
     let written = [upload(bytemuck::bytes_of(&entities)), upload(bytemuck::bytes_of(&clusters))];

@@ -119,7 +119,7 @@ fn a_shader_finds_what_rust_finds() {
     std::fs::write(folder.path().join("lookup.comp"), LOOKUP).unwrap();
     let library = Library { shader_dir: Some(folder.path().to_path_buf()), ..gpu.library.clone() };
     let shader = library.shader(&ShaderPermutation::new("lookup.comp", 4).self_visibility()).unwrap();
-    let pass = ComputePipeline::new(&gpu.device, "lookup", &shader, &[]).unwrap();
+    let pass = ComputePipeline::new(&gpu.device, "lookup", &shader).unwrap();
     let mut rng = fastrand::Rng::with_seed(8);
     let maps: Vec<[u8; BYTES]> = (0..16).map(|_| std::array::from_fn(|_| rng.u8(..))).collect();
     let mut rays: Vec<[Vec3; 2]> = (0..4000).map(|_| [0; 2].map(|_| random_direction(&mut rng).as_vec3())).collect();

@@ -19,8 +19,6 @@ use std::path::Path;
 /// Differences of f32 arithmetic between device and twin: some 20 products and rotations of numbers around the
 /// brightest radiosity, each off by 6e-8 of it. The stored numbers are the same in both, f16 or not.
 pub const ARITHMETIC: f64 = 1e-5;
-/// Vulkan lets a device be off by 4096 units in the last place in atan and acos: 2.4e-4 of an angle.
-pub const ANGLES: f64 = 3e-4;
 
 /// A floor, a wall that stands on it, a ball that is lit and shades itself with a ring, two lights of which one has
 /// colours of its own, and a sky. Positions are odd, so that no vertex lies on a border between samples.

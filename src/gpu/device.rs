@@ -3,7 +3,7 @@
 use super::Checked;
 use super::instance::{Instance, OwnInstance};
 use super::select::{Candidate, choose, physical_devices, queue_family};
-use super::validation::{Messages, Validation};
+use super::validation::Validation;
 use crate::error::Result;
 use ash::vk;
 use std::ffi::{CStr, CString};
@@ -178,11 +178,6 @@ impl Device {
     /// Messages of the validation layer since the last call.
     pub fn take_validation_messages(&self) -> Vec<String> {
         self.instance.messages.take()
-    }
-
-    /// Where the validation layer's messages arrive, to read what it says when the device is destroyed.
-    pub fn validation_messages(&self) -> Arc<Messages> {
-        self.instance.messages.clone()
     }
 
     /// Makes every recording omit its `index`-th barrier, counted from 0, so that a test can show that the tracker

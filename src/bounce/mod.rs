@@ -62,6 +62,9 @@ const LEAST_CHANGE: f64 = 0.005;
 /// Steps with light from other groups, the last ones.
 const MET: u32 = 2;
 
+/// Entries that views have to hold for the lists of what moves: more than all clusters of a large scene have.
+const MOST_ENTRIES: u64 = 1 << 24;
+
 /// Links of all vertices of a scene, by the places of entities' vertices in the buffers of light.
 #[derive(Default)]
 pub struct Linked {
@@ -216,15 +219,15 @@ pub struct Bounce {
 }
 
 impl Bounce {
-    /// `soft` tells whether the scene has sharp lights; `merge` reads fields as these passes will, and `self_shadows`
-    /// tells whether there are maps of self-visibility.
+    /// `soft` tells whether the scene has sharp lights; `merge` reads fields as these passes will where views hold the
+    /// lists, too, and the maps of self-visibility, `self_cells`, if there are any.
     pub fn new(
         device: &Arc<Device>,
         library: &Library,
         linked: Linked,
         soft: bool,
         merge: MergePermutation,
-        self_shadows: bool,
+        self_cells: Option<&Buffer>,
     ) -> Result<Self> {
         let counts = [linked.runs.len() as u32, linked.ranges.len() as u32];
         let run_light = Buffer::new(device, "light of runs", BufferKind::Device, 16 * u64::from(counts[0]))?;
@@ -234,7 +237,10 @@ impl Bounce {
         let meets = linked.meets();
         let pipeline = |name: &str, row: ShaderPermutation| ComputePipeline::new(device, name, &library.shader(&row)?);
         let Linked { surfaces, far, ranges, .. } = linked;
-        let movers = || Movers::new(device, library, (surfaces, far), merge, self_shadows, ranges.len());
+        let views_hold = TexelView::fits(device, vk::Format::R32_UINT, 4 * MOST_ENTRIES)
+            && self_cells.is_none_or(|cells| TexelView::fits(device, vk::Format::R32G32_UINT, cells.size_bytes));
+        let merge = MergePermutation { variant: merge.variant.restricted(views_hold, true), ..merge };
+        let movers = || Movers::new(device, library, (surfaces, far), merge, self_cells.is_some(), ranges.len());
         Ok(Bounce {
             means: pipeline("runs", runs_row(texels))?,
             bounce: pipeline("bounce", bounce_row(texels, soft, meets))?,

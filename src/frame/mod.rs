@@ -174,10 +174,10 @@ impl Frame {
         let linked = bounces
             .then(|| links.into_iter().enumerate().map(linked).collect::<Vec<_>>())
             .and_then(|entities| Linked::new(&entities, &rigid));
-        let self_shadows = buffers.has_self_shadows();
+        let self_cells = buffers.has_self_shadows().then_some(&buffers.self_cells);
         let permutation = merge.permutation;
         let mut bounce = linked
-            .map(|linked| Bounce::new(device, library, linked, sharp.is_some(), permutation, self_shadows))
+            .map(|linked| Bounce::new(device, library, linked, sharp.is_some(), permutation, self_cells))
             .transpose()?;
         if let Some(bounce) = &mut bounce {
             bounce.set_albedos(&albedos(&scene))?;

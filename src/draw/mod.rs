@@ -338,6 +338,9 @@ impl Draw {
         background: Vec3,
         white: f32,
     ) -> Result<()> {
+        // Its hue is kept, as that of surfaces is.
+        let brightest = background.max_element();
+        let background = if brightest > white { background * (white / brightest) } else { background };
         let background = match self.finish() {
             Finish::Linear => background,
             Finish::Display => Vec3::from_array((background / white).to_array().map(srgb_from_linear)),

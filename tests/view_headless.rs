@@ -118,7 +118,10 @@ fn a_bake_shows_the_scene_without_shadows() {
 /// Light on coarse surfaces of the scene as it stands comes before the fields of what moves are baked.
 #[test]
 fn a_bake_shows_its_light_before_it_ends() {
-    let finer = |setup: &mut Setup| setup.frame.bake = bake::Options { groups: true, ..bake::Options::default() };
+    // Captures so fine that their bake takes much longer than the coarse surfaces'.
+    let finer = |setup: &mut Setup| {
+        setup.frame.bake = bake::Options { groups: true, face_px: 256, ..bake::Options::default() };
+    };
     let Some(mut stand) = Stand::with("lit", finer) else { return };
     stand.until("light", |viewer| viewer.previewed() == Previewed::Light || viewer.frame().is_some());
     assert!(stand.viewer.frame().is_none() && stand.viewer.is_baking(), "the whole was baked before");

@@ -368,6 +368,9 @@ vec3 chain_sum(Surface surface, Entity shining, bool open, uint first, uint coun
             do {
                 if (is_sheet(packed)) {
                     pass_sheet(shadow, ENTITY(packed & SKY_CHAIN), surface, light, block);
+#if EDGES
+                    near_occluders |= occluder_bit(packed & SKY_CHAIN);
+#endif
                     j = next_entry(surface, first, count, j + 1, true);
                     packed = entry_at(first + j);
                 }

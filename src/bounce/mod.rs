@@ -6,8 +6,9 @@
 //! a bounce.
 //!
 //! Between groups light goes by [`movers`], in the last two steps, as it needs the light that those before bring. There
-//! are no more steps than are seen, which follows from the links and the albedos. Only fronts reflect. A lamp in spherical harmonics inside a closed mesh lights nothing of
-//! it, as the mesh's transfer ends where its own far side blocks; a sharp one does.
+//! are no more steps than are seen, which follows from the links and the albedos. Only fronts reflect. A lamp in
+//! spherical harmonics inside a closed mesh lights nothing of it, as the mesh's transfer ends where its own far side
+//! blocks; a sharp one does.
 
 pub mod movers;
 pub(crate) mod twin;

@@ -117,8 +117,23 @@ fn fan_count(edges: &[&[HalfEdge]], corner_count: usize) -> usize {
 /// Connected components of the triangles.
 fn pieces(edges: &[&[HalfEdge]], triangle_count: usize) -> Sets {
     let mut sets = Sets::new(triangle_count);
-    edges.iter().for_each(|e| sets.join(e[0].corner as usize / 3, e[1].corner as usize / 3));
+    for pair in edges.iter().flat_map(|edge| edge.windows(2)) {
+        sets.join(pair[0].corner as usize / 3, pair[1].corner as usize / 3);
+    }
     sets
+}
+
+/// The piece that each triangle belongs to; pieces are numbered by their first triangles.
+pub fn piece_numbers(positions: &[Vec3], triangles: &[[u32; 3]]) -> Vec<u32> {
+    let sides = sides(&weld(positions, triangles).0);
+    let edges: Vec<&[HalfEdge]> = edges(&sides).collect();
+    let mut pieces = pieces(&edges, triangles.len());
+    let mut numbers = HashMap::new();
+    let mut number = |triangle: usize| {
+        let next = numbers.len() as u32;
+        *numbers.entry(pieces.root(triangle)).or_insert(next)
+    };
+    (0..triangles.len()).map(&mut number).collect()
 }
 
 /// Whether every piece of a closed surface is wound outwards, so that none is the wall of a cavity or inside out.

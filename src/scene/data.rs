@@ -324,6 +324,9 @@ pub struct MeshData {
     /// Mesh and primitive of a glTF file, counted from 0.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub part: Option<[usize; 2]>,
+    /// One of the loose pieces of the part, counted from 0. The default takes all.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub piece: Option<u32>,
     /// Columns of a matrix that scales, mirrors or shears the part. The default leaves it as it is.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub bend: Option<[f64; 9]>,
@@ -348,7 +351,7 @@ pub struct PoseData {
 impl MeshData {
     /// A mesh that a generator makes, or that neither a file nor a generator gives.
     pub fn new(name: impl Into<String>, generator: Option<Generator>) -> Self {
-        MeshData { name: name.into(), file: None, part: None, bend: None, pose: None, generator }
+        MeshData { name: name.into(), file: None, part: None, piece: None, bend: None, pose: None, generator }
     }
 }
 
@@ -361,21 +364,24 @@ impl<'de> Deserialize<'de> for MeshData {
             name: String,
             file: Option<PathBuf>,
             part: Option<[usize; 2]>,
+            piece: Option<u32>,
             bend: Option<[f64; 9]>,
             pose: Option<PoseData>,
         }
         let table = toml::Table::deserialize(source)?;
-        let (keys, rest): (toml::Table, toml::Table) =
-            table.into_iter().partition(|(key, _)| ["name", "file", "part", "bend", "pose"].contains(&key.as_str()));
-        let Keys { name, file, part, bend, pose } =
+        let (keys, rest): (toml::Table, toml::Table) = table
+            .into_iter()
+            .partition(|(key, _)| ["name", "file", "part", "piece", "bend", "pose"].contains(&key.as_str()));
+        let Keys { name, file, part, piece, bend, pose } =
             Keys::deserialize(toml::Value::Table(keys)).map_err(|e| D::Error::custom(e.message()))?;
         let fail = |what: &str| Err(D::Error::custom(format!("mesh {name:?} {what}")));
         if file.is_some() != rest.is_empty() {
             return fail("has either a file or one generator");
         }
         let of_gltf = file.as_deref().is_some_and(super::gltf::is_gltf);
-        if part.is_some() && !of_gltf || (bend.is_some() || pose.is_some()) && part.is_none() {
-            return fail("takes a part of a glTF file alone, and a bend and a pose of a part alone");
+        let is_of_part = piece.is_some() || bend.is_some() || pose.is_some();
+        if part.is_some() && !of_gltf || is_of_part && part.is_none() {
+            return fail("takes a part of a glTF file alone, and a piece, a bend and a pose of a part alone");
         }
         if pose.is_some_and(|pose| !pose.time_s.is_finite()) {
             return fail("has a pose at a time that is not finite");
@@ -385,7 +391,7 @@ impl<'de> Deserialize<'de> for MeshData {
         }
         let generator = (!rest.is_empty()).then(|| Generator::deserialize(toml::Value::Table(rest))).transpose();
         let generator = generator.map_err(|e| D::Error::custom(format!("mesh {name:?}: {}", e.message())))?;
-        Ok(Self { name, file, part, bend, pose, generator })
+        Ok(Self { name, file, part, piece, bend, pose, generator })
     }
 }
 

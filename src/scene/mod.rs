@@ -599,7 +599,8 @@ fn build_mesh(
         (Some(file), None) if data.part.is_some() => {
             let [mesh, at] = data.part.unwrap_or_default();
             let bend = data.bend.map_or(DMat3::IDENTITY, |bend| DMat3::from_cols_array(&bend));
-            readers.get(file)?.part(gltf::Part { mesh, at, pose: data.pose }, bend, &data.name)?
+            let part = gltf::Part { mesh, at, pose: data.pose, piece: data.piece };
+            readers.get(file)?.part(part, bend, &data.name)?
         }
         (Some(file), None) if gltf::is_gltf(file) => {
             let path = folder.join(file);

@@ -62,7 +62,7 @@ use lamp::Lamps;
 pub use notes::Notes;
 use pose::Pose;
 use shape::Shape;
-use surface::{Map, Surface};
+use surface::{Map, Paint, Surface};
 use texture::Textures;
 use tree::{SplitTransform, Stand};
 
@@ -70,6 +70,8 @@ use tree::{SplitTransform, Stand};
 const FILL_SHARE: f64 = 0.1;
 /// What is said of poses.
 const POSES: &str = "movements of skins and morph targets (they stand in one pose)";
+/// Most entities that primitives of several pieces may become, in all; beyond that every primitive stays whole.
+const PIECES_LIMIT: u32 = 512;
 /// Largest number of triangles of all meshes of a scene.
 const TRIANGLES_LIMIT: usize = 16_000_000;
 
@@ -160,16 +162,17 @@ struct Primitive {
     name: String,
 }
 
-/// A primitive of a mesh, in a pose if it is given.
+/// A primitive of a mesh, in a pose if it is given, or one piece of it.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Part {
     pub mesh: usize,
     pub at: usize,
     pub pose: Option<PoseData>,
+    pub piece: Option<u32>,
 }
 
 impl Part {
-    /// What tells it from others.
+    /// What tells its primitive from others.
     fn key(&self) -> PartKey {
         (self.mesh, self.at, self.pose.map(|pose| (pose.node, pose.time_s.to_bits())))
     }
@@ -239,13 +242,14 @@ impl Reader {
         let Some(Some(primitive)) = self.primitives.get(&part.key()) else {
             return Err(self.document.fail(place(), "it has no triangles"));
         };
-        self.triangle_count += primitive.shape.triangle_count();
+        let has_backs = primitive.surface.has_backs;
+        let attributes = primitive.surface.attributes.clone();
+        let mesh = primitive.shape.mesh(&self.document, name, bend, attributes, part.piece)?;
+        self.triangle_count += mesh.triangles.len();
         if self.triangle_count > TRIANGLES_LIMIT {
             let what = format!("over the limit of {TRIANGLES_LIMIT} triangles in all");
             return Err(self.document.fail(&primitive.shape.place, what));
         }
-        let has_backs = primitive.surface.has_backs;
-        let mesh = primitive.shape.mesh(&self.document, name, bend, primitive.surface.attributes.clone())?;
         Ok(if has_backs && !mesh.is_closed() { mesh.with_backs() } else { mesh })
     }
 
@@ -254,7 +258,7 @@ impl Reader {
         if self.primitives.contains_key(&part.key()) {
             return Ok(());
         }
-        let Part { mesh, at, pose } = part;
+        let Part { mesh, at, pose, .. } = part;
         let pose = pose.map(|pose| self.pose(mesh, pose)).transpose()?;
         let document = self.document.clone();
         let json = &document.root.meshes[mesh];
@@ -306,8 +310,8 @@ struct Builder {
     reader: Reader,
     stage: Rc<Stage>,
     options: Options,
-    /// Meshes by part and bend, the bend as bits.
-    made: HashMap<(PartKey, [u64; 9]), usize>,
+    /// Meshes by primitive, piece and bend, the bend as bits.
+    made: HashMap<(PartKey, Option<u32>, [u64; 9]), usize>,
     meshes: Vec<(MeshData, Arc<Mesh>)>,
     /// Textures by material and number of the image, and the tints that vary the colour.
     painted: HashMap<(Option<usize>, [u32; 3]), usize>,
@@ -341,7 +345,7 @@ impl Builder {
     fn build(mut self) -> Result<Import> {
         let document = self.reader.document.clone();
         let stage = self.stage.clone();
-        let mut entities = Vec::new();
+        let mut parts = Vec::new();
         let mut posed = 0;
         for stand in &stage.stands {
             let node = &document.root.nodes[stand.node];
@@ -351,7 +355,7 @@ impl Builder {
                 .then_some(PoseData { node: stand.node, time_s: self.options.time_s });
             // A skin's vertices are in the world.
             let in_world = node.skin.map(|_| Stand { fixed: DAffine3::IDENTITY, motion: Vec::new(), ..stand.clone() });
-            let stand = in_world.as_ref().unwrap_or(stand);
+            let stand = in_world.unwrap_or_else(|| stand.clone());
             if pose.is_some() {
                 posed += 1;
                 let follows = |node: usize| stage.stands.iter().any(|s| s.node == node && !s.motion.is_empty());
@@ -362,12 +366,10 @@ impl Builder {
                 }
             }
             for at in 0..document.root.meshes[mesh].primitives.len() {
-                entities.extend(self.entity(stand, Part { mesh, at, pose })?);
-            }
-            if entities.len() > ENTITY_LIMIT {
-                return Err(document.fail("nodes", format!("over the limit of {ENTITY_LIMIT} entities")));
+                parts.push((stand.clone(), Part { mesh, at, pose, piece: None }));
             }
         }
+        let entities = self.entities(&parts)?;
         if posed > 0 {
             let time_s = self.options.time_s;
             self.reader.notes.say(format!("skins and morph targets ({posed}) stand in their pose at {time_s} s"));
@@ -375,9 +377,43 @@ impl Builder {
         self.finish(&stage.stands, entities)
     }
 
+    /// The entities of parts and where they stand. A primitive of loose pieces becomes as many entities, since outlines
+    /// of simple shapes hold closer to them: a table is a board and its legs.
+    fn entities(&mut self, parts: &[(Stand, Part)]) -> Result<Vec<EntityData>> {
+        let counts: Vec<u32> = parts.iter().map(|(_, part)| self.piece_count(*part)).collect::<Result<_>>()?;
+        let cut_count: u32 = counts.iter().filter(|count| **count > 1).sum();
+        let mut entities = Vec::new();
+        for ((stand, whole), count) in parts.iter().zip(counts) {
+            if count == 1 || cut_count > PIECES_LIMIT {
+                entities.extend(self.entity(stand, *whole)?);
+            } else {
+                for piece in 0..count {
+                    entities.extend(self.entity(stand, Part { piece: Some(piece), ..*whole })?);
+                }
+            }
+            if entities.len() > ENTITY_LIMIT {
+                let what = format!("over the limit of {ENTITY_LIMIT} entities");
+                return Err(self.reader.document.fail("nodes", what));
+            }
+        }
+        Ok(entities)
+    }
+
+    /// How many pieces a primitive is cut into. Lamps and surfaces that let light through stay whole, and so do the many
+    /// cards of a plant.
+    fn piece_count(&mut self, part: Part) -> Result<u32> {
+        self.reader.read(part)?;
+        let Some(Some(Primitive { shape, surface, .. })) = self.reader.primitives.get(&part.key()) else {
+            return Ok(1);
+        };
+        let has_alpha = |paint: &Paint| paint.texture.alpha_cutoff.is_some() || paint.texture.alpha_blend;
+        let passes_light = surface.opacity < 1.0 || surface.paint.as_ref().is_some_and(has_alpha);
+        let is_solid = !passes_light && surface.emission == Vec3::ZERO;
+        Ok(if is_solid { shape.piece_count() } else { 1 })
+    }
+
     /// The entity of a part, if it has triangles.
     fn entity(&mut self, stand: &Stand, part: Part) -> Result<Option<EntityData>> {
-        self.reader.read(part)?;
         let Part { mesh, at, .. } = part;
         let document = self.reader.document.clone();
         let Some(Some(primitive)) = self.reader.primitives.get(&part.key()) else { return Ok(None) };
@@ -400,9 +436,15 @@ impl Builder {
         let [gloss_map, normal_map, glow_map] = maps.map(|map| map.map(|map| self.map(map)));
         let made = self.mesh(part, bend)?;
         let several = document.root.meshes[mesh].primitives.len() > 1;
-        let own = document.root.nodes[stand.node].name.clone().unwrap_or_else(|| format!("node {}", stand.node));
+        let mut name = document.root.nodes[stand.node].name.clone().unwrap_or_else(|| format!("node {}", stand.node));
+        if several {
+            name = format!("{name} {at}");
+        }
+        if let Some(piece) = part.piece {
+            name = format!("{name}, piece {piece}");
+        }
         Ok(Some(EntityData {
-            name: Some(if several { format!("{own} {at}") } else { own }),
+            name: Some(name),
             position: stand.fixed.translation.as_vec3(),
             rotation: RotationData::Quaternion(parts.rotation.as_quat().to_array()),
             scale: scale.unwrap_or(1.0),
@@ -469,7 +511,7 @@ impl Builder {
 
     /// Index of the mesh of a part under a bend.
     fn mesh(&mut self, part: Part, bend: DMat3) -> Result<usize> {
-        let key = (part.key(), bend.to_cols_array().map(|x| (x + 0.0).to_bits()));
+        let key = (part.key(), part.piece, bend.to_cols_array().map(|x| (x + 0.0).to_bits()));
         if let Some(made) = self.made.get(&key) {
             return Ok(*made);
         }
@@ -486,6 +528,7 @@ impl Builder {
         let own = primitive.name.strip_prefix(lamp::BALL).map(|rest| format!("a {}{rest}", lamp::BALL));
         let own = own.unwrap_or_else(|| primitive.name.clone());
         let wanted = if is_bent { format!("{own} scaled") } else { own };
+        let wanted = part.piece.map_or(wanted.clone(), |piece| format!("{wanted}, piece {piece}"));
         let name = free_name(&wanted, |name| !self.names.contains(name));
         let made = self.reader.part(part, bend, &name)?;
         self.names.insert(name.clone());
@@ -493,6 +536,7 @@ impl Builder {
             name,
             file: Some(self.file.clone()),
             part: Some([part.mesh, part.at]),
+            piece: part.piece,
             pose: part.pose,
             bend: is_bent.then(|| bend.to_cols_array()),
             generator: None,

@@ -1,5 +1,6 @@
 //! Primitives of meshes as triangles.
 
+use std::cell::OnceCell;
 use std::collections::HashMap;
 
 use ::gltf::json::mesh::{Mode, Primitive, Semantic};
@@ -10,9 +11,14 @@ use super::accessor;
 use super::document::Document;
 use super::notes::Notes;
 use super::pose::Pose;
-use crate::asset::Mesh;
 use crate::asset::mesh::{Attributes, TRIANGLE_LIMIT, area_m2};
+use crate::asset::{Mesh, topology};
 use crate::error::Result;
+
+/// Most pieces that a primitive is cut into, the small ones together as one of them.
+const PIECES_LIMIT: usize = 64;
+/// A piece of less than this share of the area is a small one.
+const SMALL_PIECE: f64 = 1e-3;
 
 /// The triangles of a primitive. Where it has no normals, every triangle has vertices of its own with its own normal,
 /// as the specification demands.
@@ -25,6 +31,7 @@ pub struct Shape {
     /// The element of the accessors that each vertex has.
     source: Vec<u32>,
     attributes: HashMap<Semantic, usize>,
+    pieces: OnceCell<Vec<u32>>,
 }
 
 /// Accessors of a primitive by what they hold.
@@ -98,7 +105,7 @@ impl Shape {
         let mut shape = match normals {
             Some(normals) => {
                 let source = (0..positions.len() as u32).collect();
-                Shape { place, positions, normals, triangles, source, attributes }
+                Shape { place, positions, normals, triangles, source, attributes, pieces: OnceCell::new() }
             }
             None => flat(place, &positions, &triangles, attributes),
         };
@@ -114,11 +121,62 @@ impl Shape {
         Ok(Some(shape))
     }
 
-    /// The mesh, transformed by `bend`.
-    pub fn mesh(&self, document: &Document, name: &str, bend: DMat3, attributes: Attributes) -> Result<Mesh> {
-        let shape = self.bent(bend, DVec3::ZERO);
-        Mesh::with_attributes(name, shape.0, shape.1, attributes, shape.2)
+    /// The mesh of all pieces or one, transformed by `bend`.
+    pub fn mesh(
+        &self,
+        document: &Document,
+        name: &str,
+        bend: DMat3,
+        attributes: Attributes,
+        piece: Option<u32>,
+    ) -> Result<Mesh> {
+        let (positions, normals, mut triangles) = self.bent(bend, DVec3::ZERO);
+        if let Some(piece) = piece {
+            let mut numbers = self.pieces().iter();
+            triangles.retain(|_| numbers.next() == Some(&piece));
+        }
+        if triangles.is_empty() {
+            return Err(document.fail(&self.place, "there is no such piece"));
+        }
+        Mesh::with_attributes(name, positions, normals, attributes, triangles)
             .map_err(|error| document.fail(&self.place, error))
+    }
+
+    /// The number of the piece that each triangle belongs to: connected surfaces, and all small ones together. All are 0
+    /// where there are too many.
+    fn pieces(&self) -> &[u32] {
+        self.pieces.get_or_init(|| {
+            let numbers = topology::piece_numbers(&self.positions, &self.triangles);
+            let whole = vec![0; numbers.len()];
+            let count = numbers.iter().max().map_or(0, |last| *last as usize + 1);
+            let mut areas = vec![0.0; count];
+            for (number, triangle) in numbers.iter().zip(&self.triangles) {
+                areas[*number as usize] += area_m2(&self.positions, &[*triangle]);
+            }
+            let all: f64 = areas.iter().sum();
+            let is_small = |area: f64| area < SMALL_PIECE * all;
+            let large_count = areas.iter().filter(|area| !is_small(**area)).count() as u32;
+            let small: f64 = areas.iter().filter(|area| is_small(**area)).sum();
+            // What has nearly no area is no mesh of its own.
+            let of_small = if small > 1e-6 * all { large_count } else { 0 };
+            if large_count.max(of_small + 1) as usize > PIECES_LIMIT {
+                return whole;
+            }
+            let mut next = 0;
+            let mut renumbered = vec![of_small; count];
+            for (number, area) in renumbered.iter_mut().zip(&areas) {
+                if !is_small(*area) {
+                    *number = next;
+                    next += 1;
+                }
+            }
+            numbers.iter().map(|number| renumbered[*number as usize]).collect()
+        })
+    }
+
+    /// How many pieces there are.
+    pub fn piece_count(&self) -> u32 {
+        self.pieces().iter().max().map_or(1, |last| last + 1)
     }
 
     /// Positions, normals and triangles after a transformation; a mirrored surface keeps its outside.
@@ -157,11 +215,6 @@ impl Shape {
     pub fn vertex_count(&self) -> usize {
         self.positions.len()
     }
-
-    /// How many triangles there are.
-    pub fn triangle_count(&self) -> usize {
-        self.triangles.len()
-    }
 }
 
 fn triangles(mode: Mode, corners: &[u32]) -> std::result::Result<Vec<[u32; 3]>, String> {
@@ -188,5 +241,5 @@ fn flat(place: String, positions: &[Vec3], triangles: &[[u32; 3]], attributes: H
     };
     let normals = apart.chunks_exact(3).flat_map(normal).collect();
     let triangles = (0..triangles.len() as u32).map(|t| [3 * t, 3 * t + 1, 3 * t + 2]).collect();
-    Shape { place, positions: apart, normals, triangles, source, attributes }
+    Shape { place, positions: apart, normals, triangles, source, attributes, pieces: OnceCell::new() }
 }

@@ -23,6 +23,21 @@ struct Block {
     float weight; // of this block beside those of another size
 };
 
+#if PANELS
+bool is_rectangle(SeenLight light) {
+    return light.kind == LIGHT_RECTANGLE || light.kind == LIGHT_SHEET;
+}
+
+bool is_panel(SeenLight light) {
+    return light.kind == LIGHT_DISC || is_rectangle(light);
+}
+
+// Whether it is a rectangle so long that its parts lie in one row.
+bool is_strip(SeenLight light) {
+    return is_rectangle(light) && (light.ratio * STRIP < 1.0 || light.ratio > STRIP);
+}
+#endif
+
 // `to`: vector to the centre.
 SeenLight seen_light(vec3 to, Entity shining) {
     SeenLight light;
@@ -41,11 +56,13 @@ SeenLight seen_light(vec3 to, Entity shining) {
 #if PANELS
     light.kind = shining.light_kind;
     light.ratio = shining.light_ratio;
-    bool rectangle = light.kind == LIGHT_RECTANGLE;
+    bool rectangle = is_rectangle(light);
     vec2 edges = vec2(1.0, light.ratio) * inversesqrt(1.0 + light.ratio * light.ratio);
     vec2 radii = (rectangle ? edges : vec2(sqrt(shining.light_share))) / shining.centre.w;
     mat3 axes = mat3(light.toward, light.across, light.down);
     light.facing = to_world(shining, vec3(0.0, 1.0, 0.0)) * axes;
+    // Of two sides that shine, the one that is seen.
+    light.facing *= light.kind == LIGHT_SHEET && light.facing.x > 0.0 ? -1.0 : 1.0;
     light.half_edges[0] = radii.x * (to_world(shining, vec3(1.0, 0.0, 0.0)) * axes);
     light.half_edges[1] = radii.y * (to_world(shining, vec3(0.0, 0.0, 1.0)) * axes);
     light.area = radii.x * radii.y * (rectangle ? 4.0 : PI);
@@ -58,23 +75,12 @@ float ramp_of(SeenLight light, Entity shining) {
     return -dot(to_world(shining, vec3(0.0, 1.0, 0.0)), light.toward) * shining.light_ramp.x + shining.light_ramp.y;
 }
 
-#if PANELS
-bool is_panel(SeenLight light) {
-    return light.kind == LIGHT_DISC || light.kind == LIGHT_RECTANGLE;
-}
-
-// Whether it is a rectangle so long that its parts lie in one row.
-bool is_strip(SeenLight light) {
-    return light.kind == LIGHT_RECTANGLE && (light.ratio * STRIP < 1.0 || light.ratio > STRIP);
-}
-#endif
-
 // Place of part k of a whole.
 vec2 corner(SeenLight light, uint k) {
     vec2 place = (k & 1) == 0 ? vec2(CORNER, 0.0) : vec2(0.0, CORNER);
     place = (k & 2) == 0 ? place : -place;
 #if PANELS
-    if (light.kind == LIGHT_RECTANGLE) {
+    if (is_rectangle(light)) {
         float along = 0.5 * float(k) - 0.75;
         place = vec2((k & 1) == 0 ? -0.5 : 0.5, (k & 2) == 0 ? -0.5 : 0.5);
         place = is_strip(light) ? (light.ratio < 1.0 ? vec2(along, 0.0) : vec2(0.0, along)) : place;

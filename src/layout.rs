@@ -193,6 +193,8 @@ pub enum LightKind {
     Disc,
     /// A rectangle that shines from one side.
     Rectangle,
+    /// A rectangle that shines from both sides.
+    Sheet,
 }
 
 /// The GLSL text of the structs that light is computed from.
@@ -351,7 +353,7 @@ pub const TAG_STEP: f32 = 1.0 / 255.0;
 pub const COSINE_LOBE: [f64; 3] = [0.09375, 0.5, 0.46875];
 
 /// The macros that every shader has: what both languages have to agree on.
-pub fn shared_macros() -> [(&'static str, String); 14] {
+pub fn shared_macros() -> [(&'static str, String); 15] {
     let [a, b, c] = COSINE_LOBE;
     let kind = |kind: LightKind| format!("{}u", kind as u32);
     [
@@ -369,5 +371,6 @@ pub fn shared_macros() -> [(&'static str, String); 14] {
         ("LIGHT_OUTLINE", kind(LightKind::Outline)),
         ("LIGHT_DISC", kind(LightKind::Disc)),
         ("LIGHT_RECTANGLE", kind(LightKind::Rectangle)),
+        ("LIGHT_SHEET", kind(LightKind::Sheet)),
     ]
 }

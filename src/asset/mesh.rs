@@ -141,6 +141,7 @@ impl Mesh {
             two_sided: false,
         };
         mesh.rectangle = outline::rectangle(&mesh);
+        mesh.panel = mesh.rectangle.filter(|_| mesh.colors.is_none()).and_then(|rectangle| rectangle.as_lamp());
         Ok(mesh)
     }
 
@@ -222,7 +223,8 @@ impl Mesh {
         is_ball.then(|| self.area_m2() / (4.0 * std::f64::consts::PI * radius * radius))
     }
 
-    /// The face that shines, of a lamp that shines from one flat side.
+    /// The face that shines, of a flat lamp: of a body that shines from one side, or of a rectangle in one colour at
+    /// right angles to +y whose edges run along x and z.
     pub fn panel(&self) -> Option<LampFace> {
         self.panel
     }

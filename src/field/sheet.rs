@@ -2,8 +2,9 @@
 //! block is computed from the rectangle, in closed form.
 
 use super::silhouette::{LEAST_PENUMBRA, blocked_share};
+use super::sub_light::LampFace;
 use crate::sh::polygon::{POLYGON_COEFFICIENTS, polygon};
-use glam::{DVec3, DVec4};
+use glam::{DMat3, DVec2, DVec3, DVec4};
 
 /// How near a point of a receiver may lie to a sheet's plane, in bounding radii of the receiver, and still count as
 /// beside it at that height: what stands on a floor touches it with heights that are rounding.
@@ -28,6 +29,27 @@ pub struct Rectangle {
     pub axes: [DVec3; 2],
     /// Half its sides, metres.
     pub half_m: [f64; 2],
+}
+
+impl Rectangle {
+    /// How the mesh's axes are turned against the frame in which a lamp lies: columns for its x, y and z.
+    pub fn frame(&self) -> DMat3 {
+        let [x, z] = self.axes;
+        DMat3::from_cols(x, z.cross(x), z)
+    }
+
+    /// The rectangle as a lamp, if it lies in the frame of lamps.
+    pub fn as_lamp(&self) -> Option<LampFace> {
+        let edges = DVec2::from_array(self.half_m);
+        let along = |axis: DVec3| self.axes[0].dot(axis).abs() > 1.0 - 1e-9 && self.axes[1].y.abs() < 1e-5;
+        if along(DVec3::X) {
+            Some(LampFace::Sheet(edges.y / edges.x))
+        } else if along(DVec3::Z) {
+            Some(LampFace::Sheet(edges.x / edges.y))
+        } else {
+            None
+        }
+    }
 }
 
 /// A rectangle in the world.

@@ -32,6 +32,8 @@ pub enum LampFace {
     Disc(f64),
     /// A rectangle, and its edge along z over that along x.
     Rectangle(f64),
+    /// A rectangle that shines from both sides.
+    Sheet(f64),
 }
 
 impl LampFace {
@@ -39,7 +41,7 @@ impl LampFace {
     pub fn half(self) -> DVec2 {
         match self {
             LampFace::Disc(share) => DVec2::splat(share.sqrt()),
-            LampFace::Rectangle(ratio) => DVec2::new(1.0, ratio) / ratio.hypot(1.0),
+            LampFace::Rectangle(ratio) | LampFace::Sheet(ratio) => DVec2::new(1.0, ratio) / ratio.hypot(1.0),
         }
     }
 }
@@ -117,10 +119,10 @@ pub struct SeenLight {
     panel: Option<SeenPanel>,
 }
 
-/// A face that shines from one side.
+/// A face that shines.
 #[derive(Clone, Copy, Debug)]
 struct SeenPanel {
-    /// Unit normal of that side.
+    /// Unit normal of the side that shines, or that is seen where both do.
     normal: DVec3,
     /// Vectors from the middle to the middle of an edge, metres.
     half: [DVec3; 2],
@@ -161,10 +163,13 @@ impl SeenLight {
         let half = radius * panel.half();
         let (area, pattern) = match panel {
             LampFace::Disc(_) => (PI * half.x * half.y, Pattern::DISC),
-            LampFace::Rectangle(_) => (4.0 * half.x * half.y, Pattern::rectangle(half)),
+            LampFace::Rectangle(_) | LampFace::Sheet(_) => (4.0 * half.x * half.y, Pattern::rectangle(half)),
         };
         let half = [rotation * (half.x * DVec3::X), rotation * (half.y * DVec3::Z)];
-        let seen = SeenPanel { normal: rotation * DVec3::Y, half, area, pattern };
+        let front = rotation * DVec3::Y;
+        let shows_back = matches!(panel, LampFace::Sheet(_)) && front.dot(to) > 0.0;
+        let normal = if shows_back { -front } else { front };
+        let seen = SeenPanel { normal, half, area, pattern };
         SeenLight { panel: Some(seen), ..Self::new(to, radius) }
     }
 

@@ -112,7 +112,7 @@ impl Frame {
             _ => 0.0,
         };
         let light_ratio = match method {
-            LightMethod::LampFace(LampFace::Rectangle(ratio)) => ratio,
+            LightMethod::LampFace(LampFace::Rectangle(ratio) | LampFace::Sheet(ratio)) => ratio,
             _ => 0.0,
         };
         let shift = slot.map_or(Fit::ROUND.packed(), |slot| slot.header.lattice.packed());

@@ -76,7 +76,7 @@ pub enum LightMethod {
     Ball(f64),
     /// As a sharp light of the mesh's own outline.
     Outline,
-    /// As a sharp light that shines from one flat side.
+    /// As a sharp light that is flat.
     LampFace(LampFace),
 }
 
@@ -107,6 +107,7 @@ impl LightMethod {
             LightMethod::Outline => LightKind::Outline,
             LightMethod::LampFace(LampFace::Disc(_)) => LightKind::Disc,
             LightMethod::LampFace(LampFace::Rectangle(_)) => LightKind::Rectangle,
+            LightMethod::LampFace(LampFace::Sheet(_)) => LightKind::Sheet,
         }
     }
 
@@ -118,6 +119,7 @@ impl LightMethod {
             LightMethod::Outline => "sharp, the mesh's outline",
             LightMethod::LampFace(LampFace::Disc(_)) => "sharp, a disc",
             LightMethod::LampFace(LampFace::Rectangle(_)) => "sharp, a rectangle",
+            LightMethod::LampFace(LampFace::Sheet(_)) => "sharp, a rectangle that shines from both sides",
         }
     }
 }

@@ -33,6 +33,9 @@ const EDGE_STEPS: f64 = 1.1;
 /// Steps in the width of the narrowest penumbra, of which the square is far from overflow.
 const MOST_STEPS: f64 = 1e4;
 
+/// Factor on the square of a step over the distance to a light, which makes it as bad for a vertex as a penumbra. A light
+/// at 2.2 steps is 6 % dimmer in the middle between two vertices than in their mean.
+const NEAR_LIGHT: f64 = 4.0;
 /// Factor on the sine of a light's radius in which all its parts lie: a part's middle lies [`CORNER`] from the light's,
 /// and its rim half a radius on.
 const CONE_WIDER: f64 = 1.12;
@@ -122,6 +125,7 @@ impl SharpPermutation {
             ("EDGE_REACH", EDGE_REACH),
             ("EDGE_STEPS", EDGE_STEPS),
             ("MOST_STEPS", MOST_STEPS),
+            ("NEAR_LIGHT", NEAR_LIGHT),
             ("MOST_SINE", MOST_SINE),
             ("LIMIT_SINE", LIMIT_SINE),
             ("BLEND", BLEND),

@@ -43,7 +43,7 @@ use std::path::{Path, PathBuf};
 use std::rc::Rc;
 use std::sync::Arc;
 
-use glam::{DAffine3, DMat3, Vec3};
+use glam::{DAffine3, DMat3, DQuat, Vec3};
 
 use crate::asset::Mesh;
 use crate::asset::environment::{EnvironmentData, RADIANCE_LIMIT};
@@ -431,7 +431,16 @@ impl Builder {
         if stand.fixed.translation.abs().max_element() > f64::from(POSITION_LIMIT_M) {
             return Err(document.fail(place, "it stands beyond the limit of 1e7 m"));
         }
-        let bend = if scale.is_some() { DMat3::IDENTITY } else { parts.bend };
+        let mut bend = if scale.is_some() { DMat3::IDENTITY } else { parts.bend };
+        let mut rotation = parts.rotation;
+        if emission != Vec3::ZERO
+            && !has_pattern
+            && let Some(rectangle) = self.reader.part(part, bend, "lamp")?.rectangle()
+        {
+            let frame = rectangle.frame();
+            bend = frame.transpose() * bend;
+            rotation *= DQuat::from_mat3(&frame);
+        }
         let albedo = self.albedo(part);
         let [gloss_map, normal_map, glow_map] = maps.map(|map| map.map(|map| self.map(map)));
         let made = self.mesh(part, bend)?;
@@ -446,7 +455,7 @@ impl Builder {
         Ok(Some(EntityData {
             name: Some(name),
             position: stand.fixed.translation.as_vec3(),
-            rotation: RotationData::Quaternion(parts.rotation.as_quat().to_array()),
+            rotation: RotationData::Quaternion(rotation.as_quat().to_array()),
             scale: scale.unwrap_or(1.0),
             albedo,
             gloss,
@@ -522,7 +531,8 @@ impl Builder {
         let Some(Some(primitive)) = self.reader.primitives.get(&part.key()) else {
             unreachable!("the primitive was read")
         };
-        let is_bent = bend != DMat3::IDENTITY;
+        let is_turned = (bend.transpose() * bend).abs_diff_eq(DMat3::IDENTITY, 1e-9) && bend.determinant() > 0.0;
+        let is_bent = !is_turned;
         self.bent_count += usize::from(is_bent);
         // Meshes of lamps have names of their own.
         let own = primitive.name.strip_prefix(lamp::BALL).map(|rest| format!("a {}{rest}", lamp::BALL));
@@ -538,7 +548,7 @@ impl Builder {
             part: Some([part.mesh, part.at]),
             piece: part.piece,
             pose: part.pose,
-            bend: is_bent.then(|| bend.to_cols_array()),
+            bend: (bend != DMat3::IDENTITY).then(|| bend.to_cols_array()),
             generator: None,
         };
         self.meshes.push((data, Arc::new(made)));

@@ -340,6 +340,11 @@ mod tests {
                 assert!(error.abs() < limit, "{x} x {z} at {to}: {found} {exact} {error}");
                 let behind = SeenLight::panel(to, f64::hypot(x, z), panel, DQuat::IDENTITY);
                 assert_eq!(behind.irradiance(DVec3::Y), 0.0);
+                for turned in [turned, DQuat::from_rotation_x(PI) * turned] {
+                    let sheet = SeenLight::panel(to, f64::hypot(x, z), LampFace::Sheet(z / x), turned);
+                    let other = SeenLight::panel(to, f64::hypot(x, z), panel, turned).irradiance(DVec3::Y);
+                    assert!(sheet.irradiance(DVec3::Y) > 0.0 && [0.0, sheet.irradiance(DVec3::Y)].contains(&other));
+                }
             }
         }
         // A disc that faces the surface on its axis: pi r^2 / (d^2 + r^2).

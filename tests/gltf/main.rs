@@ -10,6 +10,7 @@ mod compressed;
 #[path = "../common/model.rs"]
 mod model;
 mod motion;
+mod pieces;
 mod poses;
 mod refused;
 mod scenes;

@@ -224,6 +224,55 @@ fn pixels_carry_edges_that_vertices_do_not() {
     }
 }
 
+/// Two lamps, a wall and a ball between them: pixels of few cells tell the lights' states and the occluders apart.
+#[test]
+fn pixels_carry_edges_of_two_lamps_and_a_wall() {
+    let Some(gpu) = gpu() else { return };
+    let lamp = |place: [f64; 3]| {
+        format!("[[entity]]\nmesh = \"ball\"\nposition = {place:?}\nscale = 0.1\nemission = [600, 600, 600]\n")
+    };
+    let show = |cells: usize, shading| {
+        let head = HEAD.replace("cells = 60", &format!("cells = {cells}"));
+        let scene = parse(&format!(
+            "{head}[[entity]]\nmesh = \"ball\"\nposition = [-0.8, 0.6, 0]\n\
+            [[mesh]]\nname = \"wall\"\nplane = {{ size_m = 1, cells = 1 }}\n\
+            [[entity]]\nmesh = \"wall\"\nposition = [0.9, 0.5, 0]\nrotation = {{ axis = [0, 0, 1], angle_deg = 80 }}\n\
+            receives = false\n{}{}",
+            lamp([-2.0, 2.4, 0.9]),
+            lamp([2.2, 1.9, 0.7]),
+        ));
+        picture(&gpu, &scene, shading).0
+    };
+    let fine = show(300, Shading::Vertex);
+    let rms = |of: Vec<f32>| {
+        let square = |(a, b): (&f32, &f32)| f64::from(a - b).powi(2);
+        (of.iter().zip(&fine).map(square).sum::<f64>() / fine.len() as f64).sqrt()
+    };
+    let [pixels, vertices] = [Shading::Pixel, Shading::Vertex].map(|shading| rms(show(12, shading)));
+    report(&format!("of 12 cells pixels are off by {pixels:.4}, vertices by {vertices:.4}"));
+    assert!(pixels < 0.2 * vertices && vertices > 0.004, "{pixels} and {vertices}");
+}
+
+/// A lamp close to a floor of few cells lights its pixels as it lights the vertices of a fine one.
+#[test]
+fn pixels_carry_light_of_a_lamp_that_is_near() {
+    let Some(gpu) = gpu() else { return };
+    let show = |cells: usize, shading| {
+        let head = HEAD.replace("cells = 60", &format!("cells = {cells}"));
+        let lamp = "[[mesh]]\nname = \"lamp\"\nplane = { size_m = 0.5, cells = 1 }\n\
+            [[entity]]\nmesh = \"lamp\"\nposition = [0.3, 0.4, 0.2]\nemission = [5, 5, 5]\nreceives = false\n";
+        picture(&gpu, &parse(&format!("{head}{lamp}")), shading).0
+    };
+    let fine = show(300, Shading::Vertex);
+    let rms = |of: Vec<f32>| {
+        let square = |(a, b): (&f32, &f32)| f64::from(a - b).powi(2);
+        (of.iter().zip(&fine).map(square).sum::<f64>() / fine.len() as f64).sqrt()
+    };
+    let [pixels, vertices] = [Shading::Pixel, Shading::Vertex].map(|shading| rms(show(8, shading)));
+    report(&format!("of 8 cells pixels are off by {pixels:.4}, vertices by {vertices:.4}"));
+    assert!(pixels < 0.1 * vertices && vertices > 0.01, "{pixels} and {vertices}");
+}
+
 /// Pixels at the edge of a small light's shadow evaluate it, but not where a bright sky drowns it.
 #[test]
 fn faint_edges_are_left_to_vertices() {

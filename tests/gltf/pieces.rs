@@ -1,0 +1,115 @@
+//! Primitives of several loose pieces, and lamps that are one quad.
+
+use crate::model::{Model, cuboid};
+use glam::{Mat3, Quat, Vec3};
+use serde_json::json;
+use shadow_fields::scene::gltf::{self, Import};
+use shadow_fields::scene::{LightMethod, Lights, Scene};
+
+/// A board on two legs, one primitive, and specks beside them that have little area.
+fn bench(material: serde_json::Value) -> Model {
+    let mut model = Model::default();
+    let boxes = [
+        ([-1.0, 0.5, -0.3], [1.0, 0.6, 0.3]),
+        ([-0.9, 0.0, -0.2], [-0.8, 0.5, 0.2]),
+        ([0.8, 0.0, -0.2], [0.9, 0.5, 0.2]),
+    ];
+    let mut positions = Vec::new();
+    let mut normals = Vec::new();
+    let mut indices = Vec::new();
+    for (low, high) in boxes {
+        let (own, along, corners) = cuboid(low, high);
+        let first = positions.len() as u16 / 3;
+        indices.extend(corners.iter().map(|corner| first + corner));
+        positions.extend(own);
+        normals.extend(along);
+    }
+    for speck in 0..3 {
+        let first = positions.len() as u16 / 3;
+        let x = speck as f32;
+        positions.extend([x, 1.0, 0.0, x + 0.01, 1.0, 0.0, x, 1.0, -0.01]);
+        normals.extend([0.0, 1.0, 0.0].repeat(3));
+        indices.extend([first, first + 1, first + 2]);
+    }
+    let material = model.push("materials", material);
+    let positions = model.positions(&positions);
+    let attributes = json!({ "POSITION": positions, "NORMAL": model.floats(3, &normals) });
+    let indices = model.indices(&indices);
+    let mesh = model.mesh(attributes, Some(indices), Some(material));
+    model.node(json!({ "name": "bench", "mesh": mesh }));
+    model
+}
+
+fn load(model: &Model) -> (Import, Scene) {
+    let folder = tempfile::tempdir().unwrap();
+    let path = model.write(folder.path(), "m");
+    let import = gltf::load(&path, &gltf::Options::default()).unwrap_or_else(|error| panic!("{error}"));
+    // The scene file names the pieces, and finds them again.
+    let text = toml::to_string(&import.data).unwrap();
+    let file = folder.path().join("m.toml");
+    std::fs::write(&file, text).unwrap();
+    (import, Scene::load(&file).unwrap())
+}
+
+/// Names of entities but for the sun that is added.
+fn benches(scene: &Scene) -> Vec<&str> {
+    let names = scene.entities.iter().map(|entity| entity.name.as_str());
+    names.filter(|name| name.starts_with("bench")).collect()
+}
+
+#[test]
+fn loose_pieces_become_entities() {
+    let (import, scene) = load(&bench(json!({})));
+    let names = benches(&scene);
+    assert_eq!(names, ["bench, piece 0", "bench, piece 1", "bench, piece 2", "bench, piece 3"]);
+    let counts: Vec<_> = scene.meshes[..4].iter().map(|mesh| mesh.triangles.len()).collect();
+    assert_eq!(counts, [12, 12, 12, 3], "three boxes, and the specks together");
+    assert!(scene.meshes[..3].iter().all(|mesh| mesh.is_convex()));
+    for (here, there) in import.meshes.iter().zip(&scene.meshes) {
+        assert_eq!(here.content_hash(), there.content_hash());
+    }
+}
+
+#[test]
+fn lamps_and_what_lets_light_through_stay_whole() {
+    let glass = json!({ "alphaMode": "BLEND", "pbrMetallicRoughness": { "baseColorFactor": [1, 1, 1, 0.3] } });
+    for material in [json!({ "emissiveFactor": [1, 1, 1] }), glass] {
+        assert_eq!(benches(&load(&bench(material.clone())).1), ["bench"], "{material}");
+    }
+}
+
+/// However a quad that glows lies in its mesh and its node, it is a rectangle of light where the file has it.
+#[test]
+fn a_quad_that_glows_is_a_rectangle_that_shines_from_both_sides() {
+    let tilt = Quat::from_axis_angle(Vec3::new(0.6, 0.0, 0.8), 0.9);
+    let place = |x: f32, z: f32| tilt * Vec3::new(x, 0.0, z) + Vec3::new(0.1, 0.2, 0.3);
+    let corners = [place(-1.0, -0.25), place(1.0, -0.25), place(1.0, 0.25), place(-1.0, 0.25)];
+    for scale in [[2.0, 2.0, 2.0], [3.0, 3.0, 3.0]] {
+        let mut model = Model::default();
+        let glow = model.push(
+            "materials",
+            json!({ "emissiveFactor": [1, 1, 1],
+            "extensions": { "KHR_materials_emissive_strength": { "emissiveStrength": 9 } } }),
+        );
+        let positions = model.positions(&corners.map(|corner| corner.to_array()).concat());
+        let indices = model.indices(&[0, 2, 1, 0, 3, 2]);
+        let mesh = model.mesh(json!({ "POSITION": positions }), Some(indices), Some(glow));
+        let turn = Quat::from_rotation_x(0.4);
+        let node = json!({ "mesh": mesh, "translation": [1, 2, 3], "rotation": turn.to_array(), "scale": scale });
+        model.node(node);
+        let (_, scene) = load(&model);
+        let LightMethod::LampFace(face) = LightMethod::of(&scene, 0, Lights::Sharp) else {
+            panic!("{:?}", LightMethod::of(&scene, 0, Lights::Sharp))
+        };
+        let ratio = face.half().x / face.half().y;
+        assert!((ratio - 4.0).abs() < 1e-4 || (ratio - 0.25).abs() < 1e-4, "{face:?}");
+        let stretch = Mat3::from_diagonal(Vec3::from(scale));
+        let expected = corners.map(|corner| Vec3::new(1.0, 2.0, 3.0) + turn * (stretch * corner));
+        let placement = scene.at(0.0)[0];
+        for position in &scene.meshes[0].positions {
+            let found = placement.point(position.as_dvec3()).as_vec3();
+            let off = expected.iter().map(|corner| corner.distance(found)).fold(f32::INFINITY, f32::min);
+            assert!(off < 1e-5, "{found} is none of {expected:?}");
+        }
+    }
+}

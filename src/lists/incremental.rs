@@ -354,8 +354,8 @@ impl ClusterLists {
 
     /// The chains of sharp lights of all clusters of a receiver at the last update's time, for what lies as far as
     /// `margin_m` (mesh's frame) around their vertices. For each cluster the first of its entries and how many they
-    /// are, with [`OWN_MAPS`] where only maps of its own vertices go with them: none where neither an occluder nor a spot stands on them, so that light changes there no faster than
-    /// vertices show.
+    /// are, with [`OWN_MAPS`] where only maps of its own vertices go with them: none where neither an occluder nor a spot
+    /// stands on them and no light is near, so that light changes there no faster than vertices show.
     pub fn sharp_chains(&self, receiver: usize, margin_m: f32) -> (Vec<[u32; 2]>, Vec<u32>) {
         let now = self.now();
         let entity = &now.entities[receiver];
@@ -371,7 +371,8 @@ impl ClusterLists {
                 entries.truncate(sharp);
                 let has_edge = |&entry: &u32| {
                     let [entity, _] = ListEntry::entities(entry);
-                    !ListEntry::is_light(entry) || now.entities[entity as usize].is_spot()
+                    let light = &now.entities[entity as usize];
+                    !ListEntry::is_light(entry) || light.is_spot() || scope.may_be_at(light)
                 };
                 if entries.iter().any(has_edge) { entries } else { Vec::new() }
             };

@@ -6,6 +6,7 @@
 
 use crate::field::sheet::{CONTACT, Sheet};
 use crate::field::silhouette::{INSIDE, REACH, Side};
+use crate::field::sub_light::NEAR_LIGHT_STEPS;
 use crate::layout;
 use crate::layout::{COSINE_LOBE, EVERYTHING};
 use crate::lists::scene_bounds::{ClusterBounds, EntityBounds, ListLight, SceneBounds};
@@ -150,6 +151,13 @@ pub struct Scope<'m> {
 }
 
 impl<'m> Scope<'m> {
+    /// Whether a light may be so near one of the vertices that light bends between it and the next.
+    pub fn may_be_at(&self, light: &layout::DeviceEntity) -> bool {
+        let [x, y, z, inverse_radius] = light.centre.map(f64::from);
+        let gap_m = self.centre.distance(DVec3::new(x, y, z)) - 1.0 / inverse_radius - self.radius_m;
+        gap_m < NEAR_LIGHT_STEPS * 2.0 * self.radius_m
+    }
+
     /// Places bounds of a receiver's mesh in the world.
     pub fn new(
         scene: &'m SceneBounds,

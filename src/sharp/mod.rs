@@ -14,7 +14,7 @@ use crate::field::lattice::CELL_WARP;
 use crate::field::sheet::{BEYOND as BEYOND_SHEET, CONTACT};
 use crate::field::silhouette::{DEEP, INSIDE, LEAST_PENUMBRA, LEAST_STEP, NEAREST, NO_BOX, REACH, TOUCHING};
 use crate::field::silhouette_nodes::{BEYOND, EASED, LEAST_AHEAD};
-use crate::field::sub_light::{BLEND, CORNER, LIMIT_SINE, MOST_SINE, STRIP, TURNED_BY};
+use crate::field::sub_light::{BLEND, CORNER, LIMIT_SINE, MOST_SINE, NEAR_LIGHT_STEPS, STRIP, TURNED_BY};
 use crate::gpu::{Bind, Buffer, Commands, ComputePipeline, Device, TexelView};
 use crate::layout::{CLUSTER_FORMAT, CLUSTER_VERTICES, ENTRY_BITS, ENTRY_FORMAT};
 use crate::merge::variant::Reads;
@@ -33,9 +33,6 @@ const EDGE_STEPS: f64 = 1.1;
 /// Steps in the width of the narrowest penumbra, of which the square is far from overflow.
 const MOST_STEPS: f64 = 1e4;
 
-/// Factor on the square of a step over the distance to a light, which makes it as bad for a vertex as a penumbra. A light
-/// at 2.2 steps is 6 % dimmer in the middle between two vertices than in their mean.
-const NEAR_LIGHT: f64 = 4.0;
 /// Factor on the sine of a light's radius in which all its parts lie: a part's middle lies [`CORNER`] from the light's,
 /// and its rim half a radius on.
 const CONE_WIDER: f64 = 1.12;
@@ -125,7 +122,7 @@ impl SharpPermutation {
             ("EDGE_REACH", EDGE_REACH),
             ("EDGE_STEPS", EDGE_STEPS),
             ("MOST_STEPS", MOST_STEPS),
-            ("NEAR_LIGHT", NEAR_LIGHT),
+            ("NEAR_LIGHT", (NEAR_LIGHT_STEPS / EDGE_STEPS).powi(2)),
             ("MOST_SINE", MOST_SINE),
             ("LIMIT_SINE", LIMIT_SINE),
             ("BLEND", BLEND),

@@ -59,17 +59,6 @@ fn noise(lattice: &Lattice, rng: &mut Rng) -> Vec<f64> {
 }
 
 #[test]
-fn default_counts() {
-    // Samples on the edges of faces, a row and column more than cells; or in cells' centres, with a border of copies
-    // around.
-    for (edges, side) in [(Some(true), 9), (Some(false), 7)] {
-        let lattice = Lattice { edges, ..Lattice::default() };
-        assert_eq!((lattice.sample_count(), lattice.stored_count()), (20 * 6 * side * side, 20 * 6 * 9 * 9));
-        assert_eq!(lattice.sources().len() as u32, lattice.stored_direction_count());
-    }
-}
-
-#[test]
 fn faces_share_the_samples_on_their_edges() {
     for cells in [1, 3, 7] {
         let lattice: Lattice = format!("cube:3x{cells},edges,inner=0.5").parse().unwrap();

@@ -2,7 +2,6 @@
 
 mod basis;
 mod cube;
-mod glsl;
 mod lobe;
 mod polygon;
 mod product;

@@ -5,9 +5,7 @@ mod common;
 
 use common::generate;
 use common::{Gpu, gpu, library, report};
-use glam::Vec3;
 use shadow_fields::bake::assemble::Assemble;
-use shadow_fields::bake::capture::{Capture, Model, Way};
 use shadow_fields::bake::{self, Baker};
 use shadow_fields::field::{FieldKind, Storage};
 use shadow_fields::gpu::image::ImageShape;
@@ -184,40 +182,6 @@ fn the_barrier_of_a_bake_batch_is_missed() {
         }
         // Nothing that fails leaves the device in disorder.
         bake().unwrap();
-    }
-}
-
-#[test]
-fn every_barrier_of_a_picture_is_missed() {
-    let Some(gpu) = gpu() else { return };
-    let model = Model::new(&gpu.device, &generate::sphere(1.0, 1)).unwrap();
-    let capture = Capture::new(&gpu.device, &gpu.library, model, 16, FieldKind::Occlusion, Way::Computed).unwrap();
-    let eyes = [Vec3::new(1.5, 0.3, 0.2)];
-    let drawn = capture.choose(&eyes, &capture.plan(&eyes)[0]).unwrap();
-    let host = Buffer::new(&gpu.device, "host picture", BufferKind::Readback, 4 << 20).unwrap();
-    let run = || {
-        let mut commands = Commands::new(&gpu.device, "picture")?;
-        capture.record(&mut commands, &drawn, Access::TransferRead)?;
-        commands.pass("copy", |c| {
-            c.copy_image(&capture.atlas, &host);
-            Ok(())
-        })?;
-        commands.barrier(Access::TransferWrite, Access::HostRead);
-        commands.submit()
-    };
-    let passes: Vec<String> = run().unwrap().into_iter().map(|timing| timing.pass).collect();
-    assert_eq!(passes, ["capture", "copy"]);
-    assert_eq!(gpu.device.take_validation_messages(), Vec::<String>::new());
-    let named: [&[&str]; 3] = [
-        &["capture texels", "pass capture", "TransferRead"],
-        &["capture atlas", "pass capture", "pass copy"],
-        &["host picture", "pass copy", "HostRead"],
-    ];
-    for (index, words) in named.iter().enumerate() {
-        let omission = Omission::new(&gpu.device, index);
-        objection(run(), words);
-        drop(omission);
-        let _ = gpu.device.take_validation_messages();
     }
 }
 

@@ -104,41 +104,6 @@ fn results_have_no_control_characters() {
     assert_eq!(report["file"], name);
 }
 
-/// No line of a help text ends before the width is used and goes on in the next.
-#[test]
-fn help_texts_are_wrapped_once() {
-    let folder = folder();
-    let help = |width: usize, words: &[&str]| {
-        let mut command = Command::new(env!("CARGO_BIN_EXE_shadow-fields"));
-        finish(command.current_dir(folder.path()).args(words).arg("--help").env("COLUMNS", width.to_string())).stdout
-    };
-    let commands = |text: &str| -> Vec<String> {
-        let listed = text.split("Commands:\n").nth(1).unwrap_or("").lines().take_while(|line| !line.is_empty());
-        let names = listed.filter_map(|line| line.strip_prefix("  ")?.split(' ').next().map(str::to_owned));
-        names.filter(|name| !name.is_empty() && name != "help").collect()
-    };
-    for width in [80, 120] {
-        let mut pending: Vec<Vec<String>> = vec![Vec::new()];
-        let mut seen = 0;
-        while let Some(words) = pending.pop() {
-            let text = help(width, &words.iter().map(String::as_str).collect::<Vec<_>>());
-            for (line, next) in text.lines().zip(text.lines().skip(1)) {
-                let indent = |line: &str| line.len() - line.trim_start().len();
-                let first = next.trim_start().split(' ').next().unwrap_or("");
-                let goes_on =
-                    first.starts_with(|c: char| c.is_ascii_lowercase() || c == '(') && !next.trim().contains("  ");
-                let fits = line.chars().count() + 1 + first.chars().count() <= width.min(110);
-                let ends = line.is_empty() || indent(line) != indent(next) || line.trim_end().ends_with(['.', ':']);
-                let example = next.trim_start().starts_with("shadow-fields ");
-                assert!(!goes_on || !fits || ends || example, "{words:?} at {width}: {line:?} and {next:?}");
-            }
-            seen += 1;
-            pending.extend(commands(&text).into_iter().map(|name| [&words[..], &[name]].concat()));
-        }
-        assert!(seen > 15, "only {seen} commands were found");
-    }
-}
-
 #[test]
 fn headers_of_pictures_do_not_reach_the_terminal() {
     let folder = folder();

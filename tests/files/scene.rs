@@ -69,16 +69,6 @@ fn embedded_scenes_load_and_read_back() {
 }
 
 #[test]
-fn twelve_instances_has_enough_receivers() {
-    let text = embedded::scenes().into_iter().find(|s| s.0 == "twelve_instances").unwrap().1;
-    let scene = Scene::parse(text, Path::new("assets/scenes/twelve_instances.toml"), &embedded::read).unwrap();
-    let vertices: usize =
-        scene.entities.iter().filter(|e| e.receives).map(|e| scene.meshes[e.mesh].positions.len()).sum();
-    assert!(vertices >= 60_000, "{vertices}");
-    assert_eq!(scene.entities.iter().filter(|e| e.occludes).count(), 13, "the floor too");
-}
-
-#[test]
 fn a_missing_path_may_be_embedded() {
     assert!(Scene::load(Path::new("assets/scenes/../scenes/teapot_lights.toml")).is_ok());
     assert!(embedded::find(Path::new("assets/scenes/../meshes/torus.obj")).is_some());
@@ -229,19 +219,6 @@ fn smooth_keyframes_are_a_spline_through_the_keys() {
 }
 
 #[test]
-fn motion_is_the_same_at_any_rate_of_frames() {
-    let text = embedded::scenes().into_iter().find(|s| s.0 == "twelve_instances").unwrap().1;
-    let scene = Scene::parse(text, Path::new("assets/scenes/twelve_instances.toml"), &embedded::read).unwrap();
-    // The tenth frame of 10 a second, the sixtieth of 60: one second is one second, to the bit.
-    let frames =
-        |count: u32, rate: u32| (0..count).map(|i| scene.at(f64::from(i) / f64::from(rate))).collect::<Vec<_>>();
-    let (slow, fast) = (frames(21, 10), frames(121, 60));
-    for i in 0..21 {
-        assert_eq!(slow[i], fast[6 * i]);
-    }
-}
-
-#[test]
 fn built_in_meshes_are_found_from_any_scene() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("s.toml");
@@ -261,16 +238,6 @@ fn built_in_meshes_are_found_from_any_scene() {
     std::fs::write(&path, text("assets/meshes/no.obj")).unwrap();
     let error = Scene::load(&path).unwrap_err().to_string();
     assert!(error.contains("no.obj") && error.contains("s.toml:4: "), "{error}");
-}
-
-#[test]
-fn time_alone_decides() {
-    let text = embedded::scenes().into_iter().find(|s| s.0 == "torus_over_plane").unwrap().1;
-    let scene = Scene::parse(text, Path::new("assets/scenes/torus_over_plane.toml"), &embedded::read).unwrap();
-    let before = scene.at(2.5);
-    (0..100).for_each(|i| drop(scene.at(f64::from(i) * 0.1)));
-    assert_eq!(scene.at(2.5), before);
-    assert_ne!(scene.at(2.6), before);
 }
 
 #[test]

@@ -3,9 +3,8 @@
 
 use crate::{cli, model};
 use cli::{Ran, command, finish, good, names};
-use model::{F32, Model, U8, U16, glb, room};
+use model::{F32, Model, U8, glb, room};
 use serde_json::{Value, json};
-use std::path::Path;
 use tempfile::TempDir;
 
 fn folder() -> TempDir {
@@ -142,11 +141,8 @@ fn numbers_out_of_range() {
             json!("spot"),
             ["extensions.KHR_lights_punctual.lights[0].spot: ", "it is missing"],
         ),
-        ("/extensionsUsed", json!(["A"]), ["", ""]),
     ] {
-        if path != "/extensionsUsed" {
-            refused_after(set(path, value), &parts);
-        }
+        refused_after(set(path, value), &parts);
     }
     // Times that do not increase.
     let mut model = room();
@@ -249,39 +245,6 @@ fn commands_agree() {
     assert_eq!(names(folder.path()), ["cut.glb"]);
 }
 
-/// Bytes of a good file changed at random: it is read or refused in one line, and nothing panics.
-#[test]
-fn damage_at_random_is_read_or_refused() {
-    let folder = folder();
-    let path = folder.path().join("m.glb");
-    let whole = room().glb();
-    let json_end = 20 + u32::from_le_bytes(whole[12..16].try_into().unwrap()) as usize;
-    let mut random = fastrand::Rng::with_seed(5);
-    let mut read = 0;
-    let mut refused = 0;
-    for round in 0..3000 {
-        let mut bytes = whole.clone();
-        for _ in 0..random.usize(1..4) {
-            // Mostly the JSON, where a digit for another makes another index or size.
-            let at = if round % 4 == 0 { random.usize(0..bytes.len()) } else { random.usize(20..json_end) };
-            bytes[at] = match bytes[at] {
-                b'0'..=b'9' => random.u8(b'0'..=b'9'),
-                b'a'..=b'z' => random.u8(b'a'..=b'z'),
-                _ => random.u8(..),
-            };
-        }
-        std::fs::write(&path, &bytes).unwrap();
-        match shadow_fields::scene::gltf::load(&path, &Default::default()) {
-            Ok(_) => read += 1,
-            Err(error) => {
-                assert_eq!((error.exit_code(), error.line().lines().count()), (4, 1), "{error}");
-                refused += 1;
-            }
-        }
-    }
-    assert!(read > 100 && refused > 100, "{read} read, {refused} refused");
-}
-
 /// Small files that ask for much: told before anything of that size is made.
 #[test]
 fn bombs() {
@@ -338,5 +301,4 @@ fn bombs() {
     model.write(folder.path(), "m");
     refused(&folder, "m.glb", &["over the limit of 1000000 keys"]);
     assert!(started.elapsed().as_secs() < 60, "{:?}", started.elapsed());
-    let _ = (U16, Path::new(""));
 }

@@ -326,24 +326,6 @@ fn spinning_sphere_shows_the_interpolation_error() {
     assert!(rms < 1.5e-3 && worst < 2e-2, "{rms:e} RMS, {worst:e} at most");
 }
 
-#[test]
-fn instances_and_equal_meshes_share_one_field() {
-    let Some(stage) = stage() else { return };
-    let ball = |name: &str, radius_m: f32| {
-        format!("[[mesh]]\nname = \"{name}\"\nsphere = {{ radius_m = {radius_m}, subdivisions = 2 }}\n")
-    };
-    let pair = |second: &str| {
-        let entities =
-            entity("ball", "position = [0.3, 0.7, 0.1]") + &entity(second, "position = [-0.4, 0.9, 0]\nscale = 0.7");
-        let meshes = ball("ball", 0.4) + &ball("equal", 0.4) + &ball("other", 0.5);
-        scene(&format!("{WHITE_SKY}{PATCH}{meshes}{}{entities}", entity("patch", "")))
-    };
-    let bytes = |second: &str| stage.frame(&pair(second), small()).buffers.fields.size_bytes;
-    assert_eq!(bytes("equal"), bytes("ball"), "a mesh of another name and the same contents shares the field");
-    assert_eq!(bytes("other"), 2 * bytes("ball"), "another mesh has a field of its own");
-    assert_eq!(lit(&pair("ball"), small(), &stage), lit(&pair("equal"), small(), &stage));
-}
-
 /// The convention of the cosine: a vertex receives light from the side that its normal faces, and none from behind.
 #[test]
 fn light_comes_from_where_it_stands() {

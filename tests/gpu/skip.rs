@@ -330,28 +330,3 @@ fn nothing_pops_by_more_than_eps() {
     assert!(dropped && largest <= eps, "{largest}");
     assert!(largest > eps / 5.0, "the step is seen at all: {largest}");
 }
-
-/// `bench skip` has something of everything that lists leave off.
-#[test]
-fn the_house_has_something_for_every_skip() {
-    let Some(stage) = stage() else { return };
-    let house = shadow_fields::bench::house::scene().unwrap();
-    // Fine directions, as for the lamp above.
-    let bake = shadow_fields::bake::Options { lattice: "cube:6x11".parse().unwrap(), ..small().bake };
-    let options = frame::Options { bake, eps: 1e-3, ..small() };
-    let placements = house.at(0.0);
-    let mut frame = stage.frame(&house, options);
-    let light = stage.light(&mut frame, &placements);
-    let counts = frame.counts(&placements);
-    report(&format!("{counts:?}"));
-    assert_eq!(counts.empty, 6, "lamps that are out");
-    let each = [counts.below_horizon, counts.behind_light, counts.apart, counts.facing_away, counts.below_eps];
-    assert!(each.iter().all(|count| *count > 0), "{counts:?}");
-    assert!(light[0].iter().any(|c| c[0] > 0.05), "the floor is lit");
-    // With a threshold what shines with nothing is below it in any case.
-    let exact = frame::Options { eps: 0.0, ..options };
-    let mut frame = stage.frame(&house, exact);
-    let worst = against_twin(&mut frame, &placements).unwrap().worst;
-    assert!(worst < ARITHMETIC, "{worst}");
-    assert_eq!(frame.counts(&placements).empty, 6);
-}

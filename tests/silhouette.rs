@@ -1,8 +1,6 @@
 //! Silhouette fields: the pass against its twin, a ball against the overlap of two discs, and whole meshes against
 //! rays.
 
-#[path = "common/cli.rs"]
-mod cli;
 mod common;
 
 use common::generate;
@@ -302,32 +300,5 @@ fn odd_meshes_give_finite_fields() {
                 blocked_light(&field, from, DVec3::Y, &SeenLight::new(light, light.length() * angle.sin()));
             assert!(blocked.is_finite() && blocked >= 0.0 && blocked <= whole + 1e-12, "{blocked} of {whole}");
         }
-    }
-}
-
-#[test]
-fn the_program_bakes_and_shows_silhouettes() {
-    if !cli::has_device() {
-        return;
-    }
-    let folder = tempfile::tempdir().unwrap();
-    let folder = folder.path();
-    std::fs::write(folder.join("t.obj"), "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 3 1 4\n")
-        .unwrap();
-    let ran = cli::good(folder, &["bake", "t.obj", "-o", "t.sf", "--silhouette", "--quality", "draft"]);
-    assert!(ran.stdout.starts_with("t.sf: 49 maps of 32x32, "), "{}", ran.stdout);
-    let ray = ["inspect", "t.sf", "--json", "--at", "0.1,0.1,-2", "--toward", "0,0,1", "--faces", "maps.png"];
-    let shown: serde_json::Value = serde_json::from_str(&cli::good(folder, &ray).stdout).unwrap();
-    let number = |name: &str| shown["at"][name].as_f64().unwrap();
-    // The ray passes 0.1 m inside the two edges that meet in the corner at the origin.
-    assert!((number("outline_distance_m") - 0.1).abs() < 0.03, "{shown}");
-    // The outline there is a wall along the ray, from 2.0 to 2.9 m: its middle counts.
-    assert!((number("outline_along_ray_m") - 2.45).abs() < 0.1, "{shown}");
-    assert_eq!(shown["maps"], 49);
-    assert!(std::fs::read(folder.join("maps.png")).unwrap().starts_with(b"\x89PNG"));
-    let bad = [(vec!["--at", "0,0,0"], "--toward"), (vec!["--toward", "0,0,1"], "--at")];
-    for (more, named) in bad {
-        let ran = cli::finish(&mut cli::command(folder, &[&["inspect", "t.sf"][..], &more].concat()));
-        assert!(ran.code == 2 && ran.stderr.contains(named), "{more:?}: {} {}", ran.code, ran.stderr);
     }
 }

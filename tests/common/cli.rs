@@ -2,9 +2,18 @@
 
 #![allow(dead_code)] // every test binary uses its own part
 
+use super::common;
+use serde_json::Value;
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 use std::sync::OnceLock;
+use std::time::SystemTime;
+
+/// Options that make bakes small.
+pub const COARSE: &str = "--lattice cube:4x3 --face-px 16";
+/// Options that make bakes and pictures small.
+pub const SMALL: &str = "--lattice cube:4x3 --face-px 16 --size 96x64";
 
 /// What a run left behind.
 pub struct Ran {
@@ -23,11 +32,18 @@ pub fn cache() -> &'static Path {
     })
 }
 
-/// The program with arguments, in `folder`, not yet run.
-pub fn command(folder: &Path, arguments: &[&str]) -> Command {
+/// The program in `folder` with the words of a line and no cache that is named, not yet run.
+pub fn bare(folder: &Path, line: &str) -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_shadow-fields"));
-    command.current_dir(folder).args(arguments).arg("--cache-dir").arg(cache());
+    command.current_dir(folder).args(line.split(' ').filter(|word| !word.is_empty()));
     command.env_remove("RUST_LOG").env("NO_COLOR", "1");
+    command
+}
+
+/// The same with the cache of the tests.
+pub fn command(folder: &Path, line: &str) -> Command {
+    let mut command = bare(folder, line);
+    command.arg("--cache-dir").arg(cache());
     command
 }
 
@@ -38,10 +54,10 @@ pub fn finish(command: &mut Command) -> Ran {
     Ran { code: status.code().expect("it ended by itself"), stdout: text(stdout), stderr: text(stderr) }
 }
 
-/// Runs the program, which must succeed.
-pub fn good(folder: &Path, arguments: &[&str]) -> Ran {
-    let ran = finish(&mut command(folder, arguments));
-    assert_eq!(ran.code, 0, "{arguments:?}: {}", ran.stderr);
+/// Runs the program with the words of a line, which must succeed.
+pub fn good(folder: &Path, line: &str) -> Ran {
+    let ran = finish(&mut command(folder, line));
+    assert_eq!(ran.code, 0, "{line}: {}", ran.stderr);
     ran
 }
 
@@ -56,12 +72,116 @@ pub fn names(folder: &Path) -> Vec<String> {
 /// Whether a device is there, as the program sees it.
 pub fn has_device() -> bool {
     static RAN: OnceLock<Ran> = OnceLock::new();
-    let ran = RAN.get_or_init(|| finish(&mut command(Path::new("."), &["devices"])));
+    let ran = RAN.get_or_init(|| finish(&mut command(Path::new("."), "devices")));
     if ran.code != 0 {
-        super::common::skip(&ran.stderr);
+        common::skip(&ran.stderr);
     }
     ran.code == 0
 }
 
-/// Arguments that make every bake and picture small.
-pub const SMALL: [&str; 6] = ["--lattice", "cube:4x3", "--face-px", "16", "--size", "96x64"];
+/// A command that finds no driver.
+pub fn without_drivers(command: &mut Command) -> &mut Command {
+    for variable in ["VK_DRIVER_FILES", "VK_ICD_FILENAMES"] {
+        command.env(variable, "/nowhere/no.json");
+    }
+    command.env_remove("VK_ADD_DRIVER_FILES")
+}
+
+/// The same command with its program and arguments run by a shell after `how`, which limits something.
+pub fn limited(command: &Command, how: &str) -> Command {
+    let mut shell = Command::new("sh");
+    shell.current_dir(command.get_current_dir().unwrap()).args(["-c", &format!("{how}; exec \"$@\""), "sh"]);
+    shell.arg(command.get_program()).args(command.get_args());
+    shell
+}
+
+/// A folder in which the program is run.
+pub struct Folder(tempfile::TempDir);
+
+impl Folder {
+    pub fn new() -> Self {
+        Folder(tempfile::tempdir().unwrap())
+    }
+
+    /// One within another.
+    pub fn inside(outer: &Path) -> Self {
+        Folder(tempfile::tempdir_in(outer).unwrap())
+    }
+
+    /// One with files.
+    pub fn of(files: &[(&str, &str)]) -> Self {
+        let folder = Self::new();
+        files.iter().for_each(|(name, text)| folder.write(name, text));
+        folder
+    }
+
+    /// `None` where there is no device.
+    pub fn with_device() -> Option<Self> {
+        has_device().then(Self::new)
+    }
+
+    pub fn path(&self) -> &Path {
+        self.0.path()
+    }
+
+    pub fn at(&self, name: &str) -> PathBuf {
+        self.path().join(name)
+    }
+
+    pub fn names(&self) -> Vec<String> {
+        names(self.path())
+    }
+
+    pub fn read(&self, name: &str) -> Vec<u8> {
+        std::fs::read(self.at(name)).unwrap_or_else(|error| panic!("{name}: {error}"))
+    }
+
+    pub fn write(&self, name: &str, content: impl AsRef<[u8]>) {
+        std::fs::write(self.at(name), content).unwrap();
+    }
+
+    pub fn command(&self, line: &str) -> Command {
+        command(self.path(), line)
+    }
+
+    pub fn bare(&self, line: &str) -> Command {
+        bare(self.path(), line)
+    }
+
+    pub fn run(&self, line: &str) -> Ran {
+        finish(&mut self.command(line))
+    }
+
+    pub fn good(&self, line: &str) -> Ran {
+        good(self.path(), line)
+    }
+
+    /// What a good run prints as JSON.
+    pub fn json(&self, line: &str) -> Value {
+        let ran = self.good(&format!("{line} --json"));
+        serde_json::from_str(&ran.stdout).unwrap_or_else(|error| panic!("no JSON ({error}): {}", ran.stdout))
+    }
+
+    /// Sizes and times of all files, by which one that comes, goes or changes is told.
+    fn state(&self) -> BTreeMap<String, Option<(u64, SystemTime)>> {
+        let about = |name: &String| std::fs::metadata(self.at(name)).ok().map(|m| (m.len(), m.modified().unwrap()));
+        self.names().into_iter().map(|name| (name.clone(), about(&name))).collect()
+    }
+
+    /// The command ends with `code` and, besides notes, one line with every one of `parts`; no file comes, goes or
+    /// changes.
+    pub fn refuses(&self, command: &mut Command, code: i32, parts: &[&str]) {
+        let before = self.state();
+        let ran = finish(command);
+        let lines: Vec<&str> = ran.stderr.lines().filter(|line| !line.starts_with("note: ")).collect();
+        let [line] = lines[..] else { panic!("{command:?}: {} lines: {}", lines.len(), ran.stderr) };
+        assert_eq!((ran.code, ran.stdout.as_str()), (code, ""), "{command:?}: {line}");
+        assert!(line.starts_with("shadow-fields: "), "{line}");
+        parts.iter().for_each(|part| assert!(line.contains(part), "{command:?}: no {part:?} in {line:?}"));
+        assert!(self.state() == before, "{command:?}: a file came, went or changed");
+    }
+
+    pub fn refused(&self, line: &str, code: i32, parts: &[&str]) {
+        self.refuses(&mut self.command(line), code, parts);
+    }
+}

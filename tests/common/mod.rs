@@ -100,3 +100,15 @@ impl Gpu {
 pub fn pot(subdivisions: u32) -> Mesh {
     generate::teapot(subdivisions)
 }
+
+/// A PNG that states 65 535 x 65 535 pixels and has none.
+pub fn huge_png() -> Vec<u8> {
+    let mut png = b"\x89PNG\r\n\x1a\n\0\0\0\x0dIHDR".to_vec();
+    png.extend([0, 0, 255, 255, 0, 0, 255, 255, 8, 2, 0, 0, 0]);
+    let crc = png[12..].iter().fold(!0_u32, |crc, byte| {
+        (0..8).fold(crc ^ u32::from(*byte), |crc, _| (crc >> 1) ^ (0xedb8_8320 & (crc & 1).wrapping_neg()))
+    });
+    png.extend((!crc).to_be_bytes());
+    png.extend(b"\0\0\0\0IDAT\x35\xaf\x06\x1e\0\0\0\0IEND\xae\x42\x60\x82");
+    png
+}

@@ -1,5 +1,7 @@
 //! Distant light: projections against a quadrature rule and closed forms, and the orientation of pictures.
 
+#[path = "../common/mod.rs"]
+mod common;
 mod sun;
 
 use std::f64::consts::PI;
@@ -243,19 +245,8 @@ fn hdr_pictures_are_read_and_oversized_ones_refused_before_memory_is_taken() {
     });
     assert_eq!(sky.radiance(DVec3::new(0.01, 0.1, -1.0).normalize())[0], 6.0, "row 1, column 4: the 12th pixel");
     assert_eq!(sky.radiance(DVec3::NEG_Y)[0], 96.0);
-    let chunk = |name: &[u8], data: &[u8]| {
-        let body = [name, data].concat();
-        // CRC-32 as PNG has it, bit by bit.
-        let crc = !body.iter().fold(!0_u32, |crc, byte| {
-            (0..8).fold(crc ^ u32::from(*byte), |crc, _| if crc & 1 == 1 { crc >> 1 ^ 0xedb8_8320 } else { crc >> 1 })
-        });
-        [&(data.len() as u32).to_be_bytes()[..], &body, &crc.to_be_bytes()].concat()
-    };
-    let header = [&100_000_u32.to_be_bytes()[..], &50_000_u32.to_be_bytes(), &[8, 2, 0, 0, 0]].concat();
-    let png =
-        [b"\x89PNG\r\n\x1a\n".to_vec(), chunk(b"IHDR", &header), chunk(b"IDAT", &[0; 9]), chunk(b"IEND", b"")].concat();
     let hdr = b"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 50000 +X 100000\n".to_vec();
-    for bytes in [png, hdr] {
+    for bytes in [common::huge_png(), hdr] {
         let source =
             EnvironmentData { image: Some(EnvironmentImage { file: "big".into(), scale: 1.0 }), ..Default::default() };
         let error = Environment::new(&source, &|_: &Path| Ok(bytes.clone())).unwrap_err();

@@ -1,29 +1,19 @@
 //! glTF files that are no good: the program ends with exit code 4 and one line that names the file and the place in its
 //! JSON.
 
-use crate::{cli, model};
-use cli::{Ran, command, finish, good, names};
-use model::{F32, Model, U8, glb, room};
+use crate::cli::Folder;
+use crate::model::{F32, Model, U8, glb, room};
 use serde_json::{Value, json};
-use tempfile::TempDir;
-
-fn folder() -> TempDir {
-    tempfile::tempdir().unwrap()
-}
 
 /// The program refuses the file with one line that has all parts, and writes nothing.
-fn refused(folder: &TempDir, file: &str, parts: &[&str]) {
-    let before = names(folder.path());
-    let Ran { code, stdout, stderr } = finish(&mut command(folder.path(), &["import", file, "-o", "out.toml"]));
-    assert_eq!((code, stderr.lines().count(), stdout.as_str()), (4, 1, ""), "{file}: {stderr}");
-    assert!(stderr.starts_with(&format!("shadow-fields: {file}: ")), "{stderr}");
-    parts.iter().for_each(|part| assert!(stderr.contains(part), "{file}: no {part:?} in {stderr}"));
-    assert_eq!(names(folder.path()), before, "something is left behind");
+fn refused(folder: &Folder, file: &str, parts: &[&str]) {
+    let start = format!("shadow-fields: {file}: ");
+    folder.refused(&format!("import {file} -o out.toml"), 4, &[&[start.as_str()], parts].concat());
 }
 
 /// As [`refused`], for a model after a change of its JSON.
 fn refused_after(change: impl FnOnce(&mut Value), parts: &[&str]) {
-    let folder = folder();
+    let folder = Folder::new();
     let mut model = room();
     change(&mut model.json);
     model.write(folder.path(), "m");
@@ -32,13 +22,12 @@ fn refused_after(change: impl FnOnce(&mut Value), parts: &[&str]) {
 
 #[test]
 fn containers_that_are_cut_off_or_damaged() {
-    let folder = folder();
+    let folder = Folder::new();
     let whole = room().glb();
     for length in [0, 3, 4, 11, 12, 19, 20, 27, 100, whole.len() / 2, whole.len() - 1] {
-        std::fs::write(folder.path().join("cut.glb"), &whole[..length]).unwrap();
+        folder.write("cut.glb", &whole[..length]);
         refused(&folder, "cut.glb", &[]);
     }
-    let write = |bytes: &[u8]| std::fs::write(folder.path().join("m.glb"), bytes).unwrap();
     let changed = |at: usize, word: u32| {
         let mut bytes = whole.clone();
         bytes[at..at + 4].copy_from_slice(&word.to_le_bytes());
@@ -56,17 +45,17 @@ fn containers_that_are_cut_off_or_damaged() {
         (glb("[".repeat(5000).as_bytes(), b""), "its JSON: "),
         (glb(b"\xff\xfe", b""), "its JSON: "),
     ] {
-        write(&bytes);
+        folder.write("m.glb", bytes);
         refused(&folder, "m.glb", &[part]);
     }
     let many = format!("{{\"asset\":{{\"version\":\"2.0\"}},\"nodes\":[{}{{}}]}}", "{},".repeat(1_000_001));
-    write(&glb(many.as_bytes(), b""));
+    folder.write("m.glb", glb(many.as_bytes(), b""));
     refused(&folder, "m.glb", &["over the limit of 1000000 objects"]);
-    std::fs::File::create(folder.path().join("large.gltf")).unwrap().set_len(300 << 20).unwrap();
+    std::fs::File::create(folder.at("large.gltf")).unwrap().set_len(300 << 20).unwrap();
     refused(&folder, "large.gltf", &["limit of 256 MiB"]);
-    std::fs::write(folder.path().join("none.gltf"), "{\"asset\":{\"version\":\"2.0\"}}").unwrap();
-    let ran = finish(&mut command(folder.path(), &["import", "none.gltf", "-o", "none.toml"]));
-    assert_eq!(ran.code, 0, "an empty file is an empty scene: {}", ran.stderr);
+    // An empty file is an empty scene.
+    folder.write("none.gltf", "{\"asset\":{\"version\":\"2.0\"}}");
+    folder.good("import none.gltf -o none.toml");
 }
 
 #[test]
@@ -103,7 +92,7 @@ fn indices_out_of_range() {
         refused_after(set(path, value), &parts);
     }
     // An index of a vertex that is not there.
-    let folder = folder();
+    let folder = Folder::new();
     let mut model = Model::default();
     let positions = model.positions(&[0., 0., 0., 1., 0., 0., 0., 1., 0.]);
     let indices = model.indices(&[0, 1, 3]);
@@ -115,7 +104,7 @@ fn indices_out_of_range() {
 
 #[test]
 fn numbers_out_of_range() {
-    let folder = folder();
+    let folder = Folder::new();
     for bad in [f32::NAN, f32::INFINITY] {
         let mut model = Model::default();
         let positions = model.positions(&[0., 0., 0., 1., 0., 0., 0., 1., 0.]);
@@ -187,15 +176,14 @@ fn nodes_in_circles_and_extensions_that_are_not_known() {
 
 #[test]
 fn files_outside_the_folder_are_refused() {
-    let outer = folder();
-    let inner = outer.path().join("inner");
-    std::fs::create_dir(&inner).unwrap();
-    let model = room();
+    let outer = tempfile::tempdir().unwrap();
     let secret = outer.path().join("secret.bin");
-    model.write_beside(&inner, "m", "ok.bin", &secret);
-    std::fs::copy(&secret, inner.join("own.bin")).unwrap();
+    let folder = Folder::inside(outer.path());
+    let model = room();
+    model.write_beside(folder.path(), "m", "ok.bin", &secret);
+    std::fs::copy(&secret, folder.at("own.bin")).unwrap();
     #[cfg(unix)]
-    std::os::unix::fs::symlink(&secret, inner.join("link.bin")).unwrap();
+    std::os::unix::fs::symlink(&secret, folder.at("link.bin")).unwrap();
     let absolute = secret.to_str().unwrap();
     for (uri, part) in [
         ("../secret.bin", "outside the folder"),
@@ -211,44 +199,36 @@ fn files_outside_the_folder_are_refused() {
         ("data:application/octet-stream;base64,AAAA", "there are 3 bytes"),
         ("data:text/plain,AAAA", "expected data in base64"),
     ] {
-        model.write_beside(&inner, "m", uri, &inner.join("own.bin"));
-        let ran = finish(&mut command(&inner, &["import", "m.gltf", "-o", "out.toml"]));
-        assert_eq!((ran.code, ran.stderr.lines().count()), (4, 1), "{uri}: {}", ran.stderr);
-        assert!(ran.stderr.contains("m.gltf: buffers[0]") && ran.stderr.contains(part), "{uri}: {}", ran.stderr);
-        assert!(!inner.join("out.toml").exists());
+        model.write_beside(folder.path(), "m", uri, &folder.at("own.bin"));
+        refused(&folder, "m.gltf", &["buffers[0]", part]);
     }
-    model.write_beside(&inner, "m", "own.bin", &inner.join("own.bin"));
-    good(&inner, &["import", "m.gltf", "-o", "out.toml"]);
+    model.write_beside(folder.path(), "m", "own.bin", &folder.at("own.bin"));
+    folder.good("import m.gltf -o out.toml");
 }
 
 /// Every command that takes a scene or a mesh refuses a bad file alike.
 #[test]
 fn commands_agree() {
-    let folder = folder();
+    let folder = Folder::new();
     let whole = room().glb();
-    std::fs::write(folder.path().join("cut.glb"), &whole[..whole.len() / 2]).unwrap();
-    let mut commands = vec![
-        vec!["import", "cut.glb", "-o", "out.toml"],
-        vec!["render", "cut.glb", "-o", "out.png"],
-        vec!["bake", "cut.glb", "-o", "out.sf"],
-        vec!["bake", "cut.glb", "-o", "out.sf", "--silhouette"],
-        vec!["bench", "time-error", "cut.glb", "--out", "out"],
-    ];
-    if cfg!(feature = "view") {
-        commands.push(vec!["view", "cut.glb"]);
+    folder.write("cut.glb", &whole[..whole.len() / 2]);
+    for line in [
+        "import cut.glb -o out.toml",
+        "render cut.glb -o out.png",
+        "bake cut.glb -o out.sf",
+        "bake cut.glb -o out.sf --silhouette",
+        "bench time-error cut.glb --out out",
+        #[cfg(feature = "view")]
+        "view cut.glb",
+    ] {
+        folder.refused(line, 4, &["shadow-fields: cut.glb: a GLB file of"]);
     }
-    for arguments in commands {
-        let ran = finish(&mut command(folder.path(), &arguments));
-        assert_eq!((ran.code, ran.stderr.lines().count()), (4, 1), "{arguments:?}: {}", ran.stderr);
-        assert!(ran.stderr.starts_with("shadow-fields: cut.glb: a GLB file of"), "{arguments:?}: {}", ran.stderr);
-    }
-    assert_eq!(names(folder.path()), ["cut.glb"]);
 }
 
 /// Small files that ask for much: told before anything of that size is made.
 #[test]
 fn bombs() {
-    let folder = folder();
+    let folder = Folder::new();
     let started = std::time::Instant::now();
     // Elements of a sparse accessor take no bytes in the file.
     let mut model = Model::default();
@@ -271,14 +251,7 @@ fn bombs() {
     refused(&folder, "m.glb", &[]);
     // A texture that states a huge size.
     let mut model = room();
-    let mut picture = b"\x89PNG\r\n\x1a\n\0\0\0\x0dIHDR".to_vec();
-    picture.extend([0, 0, 255, 255, 0, 0, 255, 255, 8, 2, 0, 0, 0]);
-    let crc = picture[12..].iter().fold(!0_u32, |crc, byte| {
-        (0..8).fold(crc ^ u32::from(*byte), |crc, _| (crc >> 1) ^ (0xedb8_8320 & (crc & 1).wrapping_neg()))
-    });
-    picture.extend((!crc).to_be_bytes());
-    picture.extend(b"\0\0\0\0IDAT\x35\xaf\x06\x1e\0\0\0\0IEND\xae\x42\x60\x82");
-    let view = model.view(&picture);
+    let view = model.view(&crate::common::huge_png());
     let image = model.push("images", json!({ "bufferView": view, "mimeType": "image/png" }));
     let texture = model.push("textures", json!({ "source": image }));
     model.json["materials"][0]["pbrMetallicRoughness"]["baseColorTexture"] = json!({ "index": texture });

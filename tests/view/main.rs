@@ -2,6 +2,7 @@
 
 mod camera;
 mod controls;
+mod edit;
 mod files;
 mod gltf;
 mod history;

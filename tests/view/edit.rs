@@ -67,30 +67,15 @@ fn node() -> impl Strategy<Value = Motion> {
     )
 }
 
-fn entity_in_nodes() -> impl Strategy<Value = EntityData> {
-    entity_with(prop_oneof![motion(), node()])
-}
-
-fn entity_with(motion: impl Strategy<Value = Motion>) -> impl Strategy<Value = EntityData> {
-    (place(), rotation(), 0.2_f32..4.0, prop::collection::vec(motion, 0..4)).prop_map(
-        |(position, rotation, scale, motion)| EntityData {
-            name: None,
-            mesh: "m".into(),
-            position,
-            rotation,
-            scale,
-            albedo: Vec3::splat(0.5).into(),
-            gloss: None,
-            maps: Default::default(),
-            opacity: 1.0,
-            emission: Vec3::ZERO,
-            spot: None,
-            emits: None,
-            occludes: None,
-            receives: None,
-            motion,
-        },
-    )
+fn entity() -> impl Strategy<Value = EntityData> {
+    let motion = prop::collection::vec(prop_oneof![motion(), node()], 0..4);
+    (place(), rotation(), 0.2_f32..4.0, motion).prop_map(|(position, rotation, scale, motion)| EntityData {
+        position,
+        rotation,
+        scale,
+        motion,
+        ..EntityData::of_mesh("m")
+    })
 }
 
 fn time() -> impl Strategy<Value = f64> {
@@ -110,7 +95,7 @@ proptest! {
     #![proptest_config(config())]
 
     #[test]
-    fn moving_moves_the_whole_path(entity in entity_in_nodes(), by in place(), time in time()) {
+    fn moving_moves_the_whole_path(entity in entity(), by in place(), time in time()) {
         let (before, after) = (entity.at(time), edit::moved(&entity, by.as_dvec3()).unwrap().at(time));
         prop_assert!((after.position - before.position).distance(by) < 1e-4);
         prop_assert!(after.rotation.dot(before.rotation).abs() > 1.0 - 1e-6);
@@ -119,7 +104,7 @@ proptest! {
 
     /// Where things are is a function of time: asked in any order, and the same to the bit.
     #[test]
-    fn motion_has_no_memory(entity in entity_in_nodes(), times in prop::collection::vec(time(), 1..20)) {
+    fn motion_has_no_memory(entity in entity(), times in prop::collection::vec(time(), 1..20)) {
         let forth: Vec<_> = times.iter().map(|t| entity.at(*t)).collect();
         let back: Vec<_> = times.iter().rev().map(|t| entity.at(*t)).collect();
         prop_assert!(forth.iter().eq(back.iter().rev()));

@@ -1,14 +1,10 @@
 //! What `profile` counts and prints. Nothing here is timed.
 
-#[path = "common/cli.rs"]
-mod cli;
-mod common;
-
-use cli::{command, finish, good, has_device, names};
-use common::library;
+use crate::cli::{Folder, finish, names};
+use crate::common::library;
+use serde_json::Value;
 use shadow_fields::gpu::census::Census;
 use shadow_fields::shaders::ShaderPermutation;
-use std::path::Path;
 
 fn ceiling(kind: u32) -> Census {
     let row =
@@ -36,38 +32,22 @@ fn a_round_of_a_loop_is_counted() {
     assert_eq!(census.flops, 8);
 }
 
-fn json(folder: &Path, arguments: &[&str]) -> serde_json::Value {
-    let ran = good(folder, &[&["profile", "--json", "--validation", "sync"], arguments].concat());
-    serde_json::from_str(&ran.stdout).unwrap()
+fn profile(folder: &Folder, line: &str) -> Value {
+    folder.json(&format!("profile --validation sync {line}"))
 }
 
-fn positive(row: &serde_json::Value, keys: &[&str]) {
+fn positive(row: &Value, keys: &[&str]) {
     for key in keys {
-        let value = row.pointer(key).and_then(serde_json::Value::as_f64);
+        let value = row.pointer(key).and_then(Value::as_f64);
         assert!(value.is_some_and(|v| v > 0.0 && v.is_finite()), "{key} of {row}");
     }
 }
 
 #[test]
 fn two_variants_side_by_side() {
-    if !has_device() {
-        return;
-    }
-    let folder = tempfile::tempdir().unwrap();
-    let more = [
-        "--runs",
-        "2",
-        "--grid",
-        "65536",
-        "--occluders",
-        "2",
-        "--compare",
-        "texel-packed",
-        "storage",
-        "--output",
-        "out",
-    ];
-    let document = json(folder.path(), &more);
+    let Some(folder) = Folder::with_device() else { return };
+    let line = "--runs 2 --grid 65536 --occluders 2 --compare texel-packed storage --output out";
+    let document = profile(&folder, line);
     positive(
         &document["ceilings"],
         &["/gflops", "/texel_halves_giga", "/texel_packed_giga", "/storage_giga", "/triad_gb_s", "/dispatch_ms"],
@@ -83,28 +63,19 @@ fn two_variants_side_by_side() {
         assert_eq!(row["work"]["fetches"].as_u64().unwrap() > 0, name == "texel-packed");
     }
     positive(&document["ratios"][0], &["/ratio/p10", "/ratio/median", "/ratio/p90"]);
-    assert_eq!(names(&folder.path().join("out")), ["profile.csv", "profile.json"]);
+    assert_eq!(names(&folder.at("out")), ["profile.csv", "profile.json"]);
 }
 
-/// A folder that holds `floor.toml`, a scene of one floor under a uniform sky.
-fn folder_with_floor() -> tempfile::TempDir {
-    let folder = tempfile::tempdir().unwrap();
-    let text = "camera = { eye = [0, 2, 3], target = [0, 0, 0] }\nenvironment = { uniform = [1, 1, 1] }\n[[mesh]]\nname = \"floor\"\nplane = { size_m = 2, cells = 9 }\n\
-        [[entity]]\nmesh = \"floor\"\n";
-    std::fs::write(folder.path().join("floor.toml"), text).unwrap();
-    folder
-}
+/// A floor under a uniform sky.
+const FLOOR: &str = "camera = { eye = [0, 2, 3], target = [0, 0, 0] }\nenvironment = { uniform = [1, 1, 1] }\n\
+    [[mesh]]\nname = \"floor\"\nplane = { size_m = 2, cells = 9 }\n[[entity]]\nmesh = \"floor\"\n";
 
 #[test]
 fn a_scene_is_timed_pass_by_pass() {
-    if !has_device() {
-        return;
-    }
-    let folder = folder_with_floor();
-    let document = json(
-        folder.path(),
-        &["floor.toml", "--runs", "2", "--size", "64x48", "--compare", "texel-packed", "texel-shifted"],
-    );
+    let Some(folder) = Folder::with_device() else { return };
+    folder.write("floor.toml", FLOOR);
+    let line = "floor.toml --runs 2 --size 64x48 --compare texel-packed texel-shifted";
+    let document = profile(&folder, line);
     let rows = document["passes"].as_array().unwrap();
     assert!(
         rows[0]["arithmetic_share"].is_null() && rows[0]["ns_a_pair"].is_null(),
@@ -120,15 +91,12 @@ fn a_scene_is_timed_pass_by_pass() {
 
 #[test]
 fn a_bake_is_timed_pass_by_pass() {
-    if !has_device() {
-        return;
-    }
-    let folder = tempfile::tempdir().unwrap();
+    let Some(folder) = Folder::with_device() else { return };
     // Dented, so that its field is captured.
     let solid = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0.2 0.2 1\nv 0.2 0.2 0.3\n\
         f 1 2 4\nf 2 3 4\nf 3 1 4\nf 2 1 5\nf 3 2 5\nf 1 3 5\n";
-    std::fs::write(folder.path().join("solid.obj"), solid).unwrap();
-    let document = json(folder.path(), &["--bake", "solid.obj", "--runs", "1"]);
+    folder.write("solid.obj", solid);
+    let document = profile(&folder, "--bake solid.obj --runs 1");
     let rows = document["passes"].as_array().unwrap();
     let passes: Vec<_> =
         rows.iter().map(|row| (row["variant"].as_str().unwrap(), row["pass"].as_str().unwrap())).collect();
@@ -141,24 +109,20 @@ fn a_bake_is_timed_pass_by_pass() {
 /// A first run does not wait for a calibration, and the next goes by what it found.
 #[test]
 fn a_device_never_seen_gets_a_default_at_once() {
-    if !has_device() {
-        return;
-    }
-    let folder = folder_with_floor();
+    let Some(folder) = Folder::with_device() else { return };
+    folder.write("floor.toml", FLOOR);
     let variant = || {
         // A cache of its own, in which nothing is known.
-        let mut command = std::process::Command::new(env!("CARGO_BIN_EXE_shadow-fields"));
-        command.current_dir(folder.path()).args(["render", "floor.toml", "-o", "a.png", "--size", "32x32", "--json"]);
-        let ran = finish(command.args(["--cache-dir", "cache"]));
+        let ran = finish(&mut folder.bare("render floor.toml -o a.png --size 32x32 --json --cache-dir cache"));
         assert_eq!(ran.code, 0, "{}", ran.stderr);
-        let document: serde_json::Value = serde_json::from_str(&ran.stdout).unwrap();
+        let document: Value = serde_json::from_str(&ran.stdout).unwrap();
         document["variant"].as_str().unwrap().to_owned()
     };
     let known = || {
-        let names = names(&folder.path().join("cache"));
+        let names = names(&folder.at("cache"));
         let name = names.iter().find(|name| name.starts_with("calibration-")).expect("it was measured").clone();
-        let path = folder.path().join("cache").join(name);
-        let calibration: serde_json::Value = serde_json::from_slice(&std::fs::read(&path).unwrap()).unwrap();
+        let path = folder.at("cache").join(name);
+        let calibration: Value = serde_json::from_slice(&std::fs::read(&path).unwrap()).unwrap();
         (path, calibration)
     };
     let default = variant();
@@ -166,7 +130,7 @@ fn a_device_never_seen_gets_a_default_at_once() {
     let times: Vec<_> =
         calibration["milliseconds"].as_array().unwrap().iter().map(|pair| pair[1].as_f64().unwrap()).collect();
     assert!(times.len() > 1 && times.iter().all(|t| *t > 0.0), "{calibration}");
-    let write = |calibration: &serde_json::Value| std::fs::write(&path, calibration.to_string()).unwrap();
+    let write = |calibration: &Value| std::fs::write(&path, calibration.to_string()).unwrap();
     calibration["fastest"] = "storage".into();
     write(&calibration);
     assert_eq!(variant(), "storage", "what was measured is used");
@@ -182,11 +146,7 @@ fn a_device_never_seen_gets_a_default_at_once() {
 
 #[test]
 fn an_unknown_variant_lists_the_known() {
-    if !has_device() {
-        return;
-    }
-    let folder = tempfile::tempdir().unwrap();
-    let ran = finish(&mut command(folder.path(), &["profile", "--variant", "fast"]));
-    assert_eq!(ran.code, 2);
-    assert!(ran.stderr.contains("texel-shifted"), "{}", ran.stderr);
+    let Some(folder) = Folder::with_device() else { return };
+    let ran = folder.run("profile --variant fast");
+    assert!(ran.code == 2 && ran.stderr.contains("texel-shifted"), "{} {}", ran.code, ran.stderr);
 }

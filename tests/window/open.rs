@@ -1,21 +1,10 @@
 //! Files that are dropped on the window, and its close, without a window.
-#![cfg(feature = "view")]
 
-mod common;
-#[path = "common/model.rs"]
-mod model;
-#[path = "common/room.rs"]
-mod room;
-#[path = "common/stage.rs"]
-mod stage;
-#[path = "common/window.rs"]
-mod window;
-
-use model::Model;
-use room::apart;
+use crate::model::Model;
+use crate::room::{self, apart};
+use crate::stand::{SIZE, Stand};
 use shadow_fields::view::command::Command;
 use shadow_fields::view::input::{Event, Key};
-use window::{SIZE, Stand};
 
 /// A file that is dropped on the window: each kind opens, a bad one changes nothing, and edits are kept.
 #[test]

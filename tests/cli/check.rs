@@ -1,18 +1,14 @@
 //! `check`: every pass against its twin, from anywhere, and exit code 1 where one is off.
 
-#[path = "common/cli.rs"]
-mod cli;
-mod common;
-
-use cli::{command, finish, has_device};
+use crate::cli::{Folder, finish};
 use serde_json::Value;
 use shadow_fields::check::PASSES;
 use shadow_fields::shaders::FILES;
 use std::path::Path;
 
-fn check(folder: &Path, pass: Option<&str>, shaders: Option<&Path>) -> (i32, Value, String) {
-    let mut command = command(folder, &["check", "--json", "--no-progress"]);
-    command.args(pass);
+/// Checks one pass or all, with the folder's shaders or the built-in ones.
+fn check(folder: &Folder, pass: &str, shaders: Option<&Path>) -> (i32, Value, String) {
+    let mut command = folder.command(&format!("check {pass} --json --no-progress"));
     if let Some(shaders) = shaders {
         command.arg("--shader-dir").arg(shaders);
     }
@@ -28,11 +24,8 @@ fn failed(report: &Value) -> Vec<String> {
 
 #[test]
 fn every_pass_is_compared_and_passes() {
-    if !has_device() {
-        return;
-    }
-    let folder = tempfile::tempdir().unwrap();
-    let (code, report, stderr) = check(folder.path(), None, None);
+    let Some(folder) = Folder::with_device() else { return };
+    let (code, report, stderr) = check(&folder, "", None);
     assert_eq!((code, &report["passed"]), (0, &Value::Bool(true)), "{stderr}");
     let rows = report["rows"].as_array().unwrap();
     for (pass, _) in PASSES {
@@ -40,16 +33,13 @@ fn every_pass_is_compared_and_passes() {
     }
     assert!(rows.iter().all(|row| row["worst"].as_f64().unwrap() <= row["tolerance"].as_f64().unwrap()));
     assert!(!report["origin"]["device"].as_str().unwrap().is_empty());
-    assert!(cli::names(folder.path()).is_empty(), "it leaves nothing where it ran");
+    assert!(folder.names().is_empty(), "it leaves nothing where it ran");
 }
 
 /// A hair's breadth wrong in one shader at a time: the pass that runs it must be named.
 #[test]
 fn a_wrong_shader_is_found() {
-    if !has_device() {
-        return;
-    }
-    let folder = tempfile::tempdir().unwrap();
+    let Some(folder) = Folder::with_device() else { return };
     let wrong = [
         (
             "capture.vert",
@@ -73,7 +63,7 @@ fn a_wrong_shader_is_found() {
         assert!(text.contains(from), "{file} no longer says \"{from}\"");
         let shaders = tempfile::tempdir().unwrap();
         std::fs::write(shaders.path().join(file), text.replace(from, to)).unwrap();
-        let (code, report, stderr) = check(folder.path(), Some(pass), Some(shaders.path()));
+        let (code, report, stderr) = check(&folder, pass, Some(shaders.path()));
         assert_eq!((code, &report["passed"]), (1, &Value::Bool(false)), "{file}: {stderr}");
         assert!(
             !failed(&report).is_empty() && failed(&report).iter().all(|row| row == pass),

@@ -1,20 +1,9 @@
 //! A window at its limits: its display goes away, or another program destroys it.
-#![cfg(all(feature = "view", target_os = "linux"))]
 
-#[path = "common/cli.rs"]
-mod cli;
-mod common;
-#[path = "common/display.rs"]
-mod display;
-#[path = "common/room.rs"]
-mod room;
-#[path = "common/viewing.rs"]
-mod viewing;
-
-use cli::has_device;
-use display::Display;
+use crate::cli::has_device;
+use crate::display::Display;
+use crate::viewing::{SIZE, View, open};
 use std::path::Path;
-use viewing::{SIZE, View, open};
 
 /// A window whose first entity has lost or got its light, while the scene stands still or runs.
 fn edited<'d>(display: &'d Display, folder: &Path, is_still: bool) -> View<'d> {

@@ -1,25 +1,12 @@
 //! A real window on a virtual display: every control, resizing, minimising, a screenshot against `render`, a clean end.
-#![cfg(all(feature = "view", target_os = "linux"))]
 
-#[path = "common/cli.rs"]
-mod cli;
-mod common;
-#[path = "common/display.rs"]
-mod display;
-#[path = "common/drag.rs"]
-mod drag;
-#[path = "common/model.rs"]
-mod model;
-#[path = "common/room.rs"]
-mod room;
-#[path = "common/viewing.rs"]
-mod viewing;
-
-use cli::{SMALL, cache, command, finish, good, has_device};
-use display::Display;
+use crate::cli::{COARSE, SMALL, command, finish, good, has_device};
+use crate::display::Display;
+use crate::viewing::{OPTIONS, PATIENCE, SIZE, View, open};
+use crate::xdnd::drop_file;
+use crate::{model, room};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
-use viewing::{PATIENCE, SIZE, View, arguments, open};
 
 /// Keys of every row of the help, and what the log says of them.
 const KEYS: [(&str, &str); 17] = [
@@ -95,7 +82,7 @@ fn a_window_does_what_its_controls_say() {
     let heard = view.close();
     let swapchains = heard.iter().filter(|line| line.contains("swapchain of")).count();
     assert!(swapchains >= 8, "{swapchains} swapchains for ten sizes");
-    good(folder.path(), &[&["render", "scene-edited.toml", "-o", "again.png"], &SMALL[..4]].concat());
+    good(folder.path(), &format!("render scene-edited.toml -o again.png {COARSE}"));
     let again = image::open(folder.path().join("again.png")).unwrap().into_rgb8();
     assert_eq!([again.width() as usize, again.height() as usize], SIZE, "the saved scene has the window's size");
     let again: Vec<[u8; 3]> = again.pixels().map(|p| p.0).collect();
@@ -121,16 +108,12 @@ fn a_gltf_file_moves_in_the_window_and_dropped_files_open() {
     let folder = tempfile::tempdir().unwrap();
     let Some(display) = Display::open(folder.path()) else { return };
     model::robot().write(folder.path(), "robot");
-    let picture = ["render", "robot.glb", "-o", "robot_#.png", "--frames", "3", "--fps", "2"];
-    good(folder.path(), &[&picture[..], &SMALL[..]].concat());
+    good(folder.path(), &format!("render robot.glb -o robot_#.png --frames 3 --fps 2 {SMALL}"));
     let pictures = names(folder.path(), "png").into_iter().map(|file| std::fs::read(file).unwrap());
     let pictures: std::collections::BTreeSet<Vec<u8>> = pictures.collect();
     assert_eq!(pictures.len(), 3, "each picture of the motion is another");
 
-    let mut arguments = arguments();
-    arguments[0] = "robot.glb";
-    arguments.retain(|argument| *argument != "--paused");
-    let mut view = View::open(&display, folder.path(), &arguments);
+    let mut view = View::open(&display, folder.path(), &format!("view robot.glb {OPTIONS} {COARSE}"));
     // Once the first picture is there, another follows.
     for _ in 0..2 {
         let first = display.look(SIZE);
@@ -148,17 +131,17 @@ fn a_gltf_file_moves_in_the_window_and_dropped_files_open() {
     let bad = folder.path().join("bad.obj");
     std::fs::write(&bad, "f 1 2 3\n").unwrap();
     let window = view.window.parse().unwrap();
-    drag::drop_file(&display.name, window, &bad, [200, 100]);
+    drop_file(&display.name, window, &bad, [200, 100]);
     view.hears("message: not opened: ");
     let told = view.picture(SIZE);
     assert!(room::apart(&still[..480 * 200], &told[..480 * 200]) < 50, "the scene stays");
     assert!(room::apart(&still, &told) > 500, "the line is seen");
     // winit tells nothing of a file that does not exist.
-    drag::drop_file(&display.name, window, &folder.path().join("missing.toml"), [200, 100]);
+    drop_file(&display.name, window, &folder.path().join("missing.toml"), [200, 100]);
     view.hears("message: not opened: what was dropped is no file");
     // Another opens, and the window's title names it.
     let scene = room::write(folder.path(), SIZE.map(|side| side as u32), "");
-    drag::drop_file(&display.name, window, &scene, [200, 100]);
+    drop_file(&display.name, window, &scene, [200, 100]);
     view.hears("message: opened ");
     view.hears("the first picture");
     let shown = view.picture(SIZE);
@@ -186,10 +169,9 @@ fn without_a_display_one_line_names_render() {
         return;
     }
     let folder = tempfile::tempdir().unwrap();
-    let mut view = command(folder.path(), &["view", "assets/scenes/sphere_over_plane.toml"]);
+    let mut view = command(folder.path(), "view assets/scenes/sphere_over_plane.toml");
     let ran = finish(view.env_remove("DISPLAY").env_remove("WAYLAND_DISPLAY").env_remove("WAYLAND_SOCKET"));
     assert_eq!(ran.code, 3, "{}", ran.stderr);
     assert_eq!(ran.stderr.lines().count(), 1, "{}", ran.stderr);
     assert!(ran.stderr.contains("no display") && ran.stderr.contains("shadow-fields render"), "{}", ran.stderr);
-    assert!(cache().exists());
 }

@@ -1,10 +1,6 @@
 //! `bench time-error`: what it measures and says of one scene. Nothing here is timed.
 
-#[path = "common/cli.rs"]
-mod cli;
-mod common;
-
-use cli::{command, finish, good, has_device, names};
+use crate::cli::{Folder, finish, has_device, names};
 use serde_json::Value;
 
 fn rms(value: &Value) -> f64 {
@@ -13,21 +9,16 @@ fn rms(value: &Value) -> f64 {
 
 #[test]
 fn one_scene_and_one_axis() {
-    if !has_device() {
-        return;
-    }
-    let folder = tempfile::tempdir().unwrap();
-    let asked = ["bench", "time-error", "--quick", "--case", "(b)", "--axis", "storage", "--out", "out", "--json"];
-    let ran = good(folder.path(), &asked);
-    let out = folder.path().join("out");
+    let Some(folder) = Folder::with_device() else { return };
+    let printed = folder.json("bench time-error --quick --case (b) --axis storage --out out");
+    let out = folder.at("out");
     let written = names(&out);
     for name in ["budget.csv", "rival.csv", "sweep.csv", "time-error.json"] {
         assert!(written.iter().any(|found| found == name), "{name} among {written:?}");
     }
     assert!(written.iter().any(|name| name.starts_with("error-") && name.ends_with(".png")), "an error picture");
-    let text = std::fs::read_to_string(out.join("time-error.json")).unwrap();
-    let document: Value = serde_json::from_str(&text).unwrap();
-    assert_eq!(serde_json::from_str::<Value>(&ran.stdout).unwrap()["budgets"], document["outcome"]["budgets"]);
+    let document: Value = serde_json::from_slice(&folder.read("out/time-error.json")).unwrap();
+    assert_eq!(printed["budgets"], document["outcome"]["budgets"]);
     let outcome = &document["outcome"];
 
     // The ladder: what causes add up to is near the whole, and no cause is free.
@@ -71,16 +62,12 @@ fn one_scene_and_one_axis() {
 
 #[test]
 fn unknown_cases_and_axes_are_listed() {
-    if !has_device() {
-        return;
-    }
-    let folder = tempfile::tempdir().unwrap();
+    let Some(folder) = Folder::with_device() else { return };
     for (flag, known) in [("--case", "glowing_torus"), ("--axis", "storage")] {
-        let mut command = command(folder.path(), &["bench", "time-error", flag, "moonlight", "--out", "out"]);
-        let ran = finish(&mut command);
+        let ran = folder.run(&format!("bench time-error {flag} moonlight --out out"));
         assert_eq!(ran.code, 2, "{}", ran.stderr);
         assert!(ran.stderr.contains("moonlight") && ran.stderr.contains(known), "{}", ran.stderr);
-        assert!(!folder.path().join("out").exists(), "nothing is written");
+        assert!(!folder.at("out").exists(), "nothing is written");
     }
 }
 
@@ -118,13 +105,12 @@ const LIGHT: &str =
 
 #[test]
 fn a_scene_of_ones_own() {
-    if !has_device() {
-        return;
-    }
-    let folder = tempfile::tempdir().unwrap();
-    std::fs::write(folder.path().join("my ring.toml"), own_scene(LIGHT)).unwrap();
-    let asked = ["bench", "time-error", "my ring.toml", "--quick", "--axis", "storage", "--out", "out", "--json"];
-    let outcome: Value = serde_json::from_str(&good(folder.path(), &asked).stdout).unwrap();
+    let Some(folder) = Folder::with_device() else { return };
+    folder.write("my ring.toml", own_scene(LIGHT));
+    let mut asked = folder.command("bench time-error --quick --axis storage --out out --json");
+    let ran = finish(asked.arg("my ring.toml"));
+    assert_eq!(ran.code, 0, "{}", ran.stderr);
+    let outcome: Value = serde_json::from_str(&ran.stdout).unwrap();
     for (part, count) in [("budgets", 1), ("pictures", 1), ("comparisons", 5)] {
         assert_eq!(outcome[part].as_array().unwrap().len(), count, "{part}");
         assert_eq!(outcome[part][0]["case"], "my ring");
@@ -165,7 +151,7 @@ fn a_scene_of_ones_own() {
     assert!(rms(&maps[3]["error"]) < 0.9 * rms(&maps[1]["error"]), "{maps:?}");
     let flip = outcome["pictures"][0]["mean_flip_ratio"].as_f64().unwrap();
     assert!(flip > 0.0 && flip < 0.1, "{flip}");
-    let out = folder.path().join("out");
+    let out = folder.at("out");
     let written = names(&out);
     let pixels = &outcome["pictures"][0]["pixels"];
     assert!(pixels["lit_count"].as_u64().unwrap() > 10_000, "{pixels}");
@@ -176,13 +162,13 @@ fn a_scene_of_ones_own() {
     let picture =
         png::Decoder::new(std::io::BufReader::new(std::fs::File::open(out.join("beside-my-ring.png")).unwrap()));
     assert_eq!(picture.read_info().unwrap().info().size(), (1440, 480));
-    let document: Value = serde_json::from_str(&std::fs::read_to_string(out.join("time-error.json")).unwrap()).unwrap();
+    let document: Value = serde_json::from_slice(&folder.read("out/time-error.json")).unwrap();
     assert_eq!(document["origin"]["selection"]["scene"], "my ring.toml");
 }
 
 #[test]
 fn a_scene_that_cannot_be_judged_says_why() {
-    let folder = tempfile::tempdir().unwrap();
+    let folder = Folder::new();
     let buried = LIGHT.replace("2, 0.3", "-2, 0.3");
     let unlit = own_scene(LIGHT).replace("mesh = \"floor\"\n        [[", "mesh = \"floor\"\nreceives = false\n[[");
     let unlit = unlit.replace("position = [0, 0.6, 0]", "receives = false");
@@ -192,28 +178,23 @@ fn a_scene_that_cannot_be_judged_says_why() {
         ("unlit.toml", unlit, "no entity receives light"),
         ("meshless.toml", own_scene("[[entity]]\nmesh = \"horse\"\n"), "there is no mesh \"horse\""),
     ];
-    let ask = |name: &str| {
-        finish(&mut command(
-            folder.path(),
-            &["bench", "time-error", name, "--quick", "--axis", "storage", "--out", "out"],
-        ))
-    };
+    let ask = |name: &str| folder.run(&format!("bench time-error {name} --quick --axis storage --out out"));
     for (name, text, expected) in scenes {
-        std::fs::write(folder.path().join(name), text).unwrap();
+        folder.write(name, text);
         let ran = ask(name);
         assert_eq!(ran.code, 4, "{name}: {}", ran.stderr);
         assert!(ran.stderr.contains(name) && ran.stderr.contains(expected), "{name}: {}", ran.stderr);
-        assert!(!folder.path().join("out").exists(), "nothing is written");
+        assert!(!folder.at("out").exists(), "nothing is written");
     }
     assert_eq!(ask("absent.toml").code, 4);
-    let both = ["bench", "time-error", "dark.toml", "--case", "torus", "--out", "out"];
-    assert_eq!(finish(&mut command(folder.path(), &both)).code, 2, "a scene or cases");
+    let both = folder.run("bench time-error dark.toml --case torus --out out");
+    assert_eq!(both.code, 2, "a scene or cases");
     if !has_device() {
         return;
     }
     // The floor is not lit from below, and only the ring's underside would see it: it does not receive here.
     let buried = own_scene(&buried).replace("position = [0, 0.6, 0]", "position = [0, 0.6, 0]\nreceives = false");
-    std::fs::write(folder.path().join("buried.toml"), buried).unwrap();
+    folder.write("buried.toml", buried);
     let ran = ask("buried.toml");
     assert_eq!(ran.code, 4, "{}", ran.stderr);
     assert!(ran.stderr.contains("no light reaches any of the 289 judged vertices"), "{}", ran.stderr);

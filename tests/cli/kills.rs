@@ -4,13 +4,9 @@
 //! The variable SHADOW_FIELDS_KILLS says how many rounds there are for each number of processes; without it there are 2.
 #![cfg(unix)]
 
-#[path = "common/cli.rs"]
-mod cli;
-mod common;
-#[path = "common/room.rs"]
-mod room;
-
-use cli::{finish, has_device, names};
+use crate::cli::{bare, finish, has_device, names};
+use crate::common::report;
+use crate::room;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
@@ -58,10 +54,7 @@ fn place(inside: &Path, name: &str) -> PathBuf {
 }
 
 fn program(folder: &Path, arguments: &str) -> Command {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_shadow-fields"));
-    command.current_dir(folder).args(arguments.split_whitespace()).args(["--cache-dir", "../cache"]);
-    command.env_remove("RUST_LOG");
-    command
+    bare(folder, &format!("{arguments} --cache-dir ../cache"))
 }
 
 /// A program that is killed with the test.
@@ -199,7 +192,7 @@ fn kills_leave_whole_outputs_and_a_cache_that_works() {
         let first = random.usize(0..COMMANDS.len());
         (0..rounds).for_each(|round| good.kill(&mut random, crowd, (first + round) % COMMANDS.len(), &mut tally));
         let seconds = start.elapsed().as_secs_f64();
-        common::report(&format!("{crowd} processes on one cache, {rounds} rounds: {tally:?}, {seconds:.1} s"));
+        report(&format!("{crowd} processes on one cache, {rounds} rounds: {tally:?}, {seconds:.1} s"));
     }
 }
 
@@ -229,7 +222,7 @@ fn caches_that_cannot_be_written_lose_nothing() {
         (&["sh"], "ulimit -f 8"),
     ] {
         if shell(words, how, "--version").output().is_ok_and(|output| !output.status.success()) {
-            common::report(&format!("not allowed here: {how}"));
+            report(&format!("not allowed here: {how}"));
             continue;
         }
         let (arguments, written) = COMMANDS[NUMBERED];

@@ -1,10 +1,7 @@
 //! A window's inside that draws into an image: events and time in, pictures out.
 
-#![allow(dead_code)] // every test binary uses its own part
-
-use super::common::{self, Gpu, gpu};
-use super::room;
-use super::stage::small;
+use crate::common::{self, Gpu, gpu};
+use crate::room;
 use shadow_fields::asset::picture::srgb_from_linear;
 use shadow_fields::bake::Baker;
 use shadow_fields::bake::cache::Cache;
@@ -48,7 +45,7 @@ impl Stand {
             },
             library: gpu.library.clone(),
             cache: Cache::new(Some(&cache)),
-            frame: frame::Options { size: SIZE, ..small() },
+            frame: frame::Options { size: SIZE, ..shadow_fields::check::merge::options() },
             format: FORMAT,
             encodes_srgb: true,
             seed: 1,

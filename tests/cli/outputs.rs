@@ -2,18 +2,11 @@
 //! waited for.
 #![cfg(unix)]
 
-#[path = "common/cli.rs"]
-mod cli;
-mod common;
-
-use cli::{Ran, SMALL, command, finish, good, has_device, names};
+use crate::cli::{Folder, Ran, SMALL, finish, has_device, limited, without_drivers};
 use shadow_fields::asset::picture::write_png;
-use std::collections::BTreeMap;
 use std::os::unix::fs::{PermissionsExt, symlink};
-use std::path::Path;
 use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
-use tempfile::TempDir;
 
 const SCENE: &str = "[camera]\neye = [0, 1, 5]\ntarget = [0, 0, 0]\n[environment]\nimage = { file = \"sky_0003.png\" }\n\
     [[mesh]]\nname = \"a\"\nfile = \"tri.obj\"\n[[mesh]]\nname = \"b\"\nfile = \"model.gltf\"\n\
@@ -29,42 +22,19 @@ const MODEL: &str = r#"{
 }"#;
 
 /// A scene with all kinds of files that a scene may name.
-fn folder() -> TempDir {
-    let folder = tempfile::tempdir().unwrap();
-    let at = |name: &str| folder.path().join(name);
+fn folder() -> Folder {
+    let folder = Folder::of(&[("s.toml", SCENE), ("tri.obj", TRIANGLE), ("model.gltf", MODEL)]);
     let corners: [f32; 9] = [0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0];
-    std::fs::write(at("s.toml"), SCENE).unwrap();
-    std::fs::write(at("tri.obj"), TRIANGLE).unwrap();
-    std::fs::write(at("model.gltf"), MODEL).unwrap();
-    std::fs::write(at("the buffer.bin"), corners.map(f32::to_le_bytes).concat()).unwrap();
+    folder.write("the buffer.bin", corners.map(f32::to_le_bytes).concat());
     for picture in ["sky_0003.png", "paint.png", "a.png", "b.png", "mask.png"] {
-        write_png(&at(picture), 4, 2, &[0.9; 24], 0.0).unwrap();
+        write_png(&folder.at(picture), 4, 2, &[0.9; 24], 0.0).unwrap();
     }
     folder
 }
 
-/// Names and contents of a folder's files.
-fn contents(folder: &Path) -> BTreeMap<String, Vec<u8>> {
-    names(folder).into_iter().map(|name| (name.clone(), std::fs::read(folder.join(name)).unwrap_or_default())).collect()
-}
-
-fn run(folder: &TempDir, line: &str) -> Ran {
-    finish(&mut command(folder.path(), &line.split(' ').collect::<Vec<_>>()))
-}
-
-/// The command ends with `code` and a single line that has all `parts`, before it looks for a device; no file changes.
-fn refused(folder: &TempDir, line: &str, code: i32, parts: &[&str]) {
-    let before = contents(folder.path());
-    let mut command = command(folder.path(), &line.split(' ').collect::<Vec<_>>());
-    for variable in ["VK_DRIVER_FILES", "VK_ICD_FILENAMES"] {
-        command.env(variable, "/nowhere/no.json");
-    }
-    let ran = finish(command.env_remove("VK_ADD_DRIVER_FILES"));
-    assert_eq!((ran.code, ran.stderr.lines().count()), (code, 1), "{line}: {}", ran.stderr);
-    for part in parts {
-        assert!(ran.stderr.contains(part), "{line}: no {part:?} in {}", ran.stderr);
-    }
-    assert!(contents(folder.path()) == before, "{line}: a file came, went or changed");
+/// The command is refused before it looks for a device.
+fn refused(folder: &Folder, line: &str, code: i32, parts: &[&str]) {
+    folder.refuses(without_drivers(&mut folder.command(line)), code, parts);
 }
 
 #[test]
@@ -79,10 +49,10 @@ fn outputs_do_not_replace_inputs() {
         ("buffer.sf", "the buffer.bin"),
         ("scene_meshes.toml", "model.gltf"),
     ] {
-        symlink(file, folder.path().join(link)).unwrap();
+        symlink(file, folder.at(link)).unwrap();
     }
-    std::fs::hard_link(folder.path().join("s.toml"), folder.path().join("hard.json")).unwrap();
-    std::fs::create_dir(folder.path().join("in")).unwrap();
+    std::fs::hard_link(folder.at("s.toml"), folder.at("hard.json")).unwrap();
+    std::fs::create_dir(folder.at("in")).unwrap();
     for (line, output, input) in [
         ("render s.toml -o o.png --error scene.png", "--error scene.png", "s.toml"),
         ("render s.toml -o o.png --vertices scene.csv", "--vertices scene.csv", "s.toml"),
@@ -106,14 +76,14 @@ fn outputs_do_not_replace_inputs() {
     // Folders take files of names that the command chooses.
     refused(&folder, "profile s.toml --output .", 2, &[".", "input s.toml"]);
     // The pictures before and after those of the scene are free.
-    let free = run(&folder, "render s.toml -o sky_####.png --first 4 --device none");
+    let free = folder.run("render s.toml -o sky_####.png --first 4 --device none");
     assert_eq!(free.code, 3, "{}", free.stderr);
 }
 
 #[test]
 fn outputs_do_not_replace_one_another() {
     let folder = folder();
-    symlink("o.png", folder.path().join("link.png")).unwrap();
+    symlink("o.png", folder.at("link.png")).unwrap();
     for (line, first, second) in [
         ("render s.toml -o o.png --error o.png", "--output o.png", "--error o.png"),
         ("render s.toml -o o.png --error link.png", "--output o.png", "--error link.png"),
@@ -121,7 +91,7 @@ fn outputs_do_not_replace_one_another() {
     ] {
         refused(&folder, line, 2, &[first, second]);
     }
-    let device = run(&folder, "render s.toml -o /dev/null --exr /dev/null --device none");
+    let device = folder.run("render s.toml -o /dev/null --exr /dev/null --device none");
     assert_eq!(device.code, 3, "a device takes everything: {}", device.stderr);
 }
 
@@ -149,24 +119,22 @@ fn every_output_asks_for_its_ending() {
 fn import_replaces_only_its_own_files() {
     let folder = folder();
     refused(&folder, "import model.gltf -o s.toml", 2, &["s.toml", "--force"]);
-    let import = ["import", "model.gltf", "-o", "m.toml"];
-    good(folder.path(), &import);
-    good(folder.path(), &import);
-    let scene = folder.path().join("m.toml");
-    std::fs::write(&scene, TRIANGLE).unwrap();
-    refused(&folder, "import model.gltf -o m.toml --quiet", 2, &["m.toml", "--force"]);
-    assert_eq!(std::fs::read_to_string(&scene).unwrap(), TRIANGLE);
-    good(folder.path(), &[&import[..], &["--force"]].concat());
-    assert_ne!(std::fs::read_to_string(&scene).unwrap(), TRIANGLE);
+    let import = "import model.gltf -o m.toml";
+    folder.good(import);
+    folder.good(import);
+    folder.write("m.toml", TRIANGLE);
+    refused(&folder, &format!("{import} --quiet"), 2, &["m.toml", "--force"]);
+    folder.good(&format!("{import} --force"));
+    assert_ne!(folder.read("m.toml"), TRIANGLE.as_bytes());
 }
 
 #[test]
 fn what_cannot_be_written_is_found_at_the_start() {
     let folder = folder();
-    let read_only = folder.path().join("kept.csv");
+    let read_only = folder.at("kept.csv");
     std::fs::write(&read_only, "kept").unwrap();
     std::fs::set_permissions(&read_only, PermissionsExt::from_mode(0o444)).unwrap();
-    std::fs::create_dir(folder.path().join("folder.exr")).unwrap();
+    std::fs::create_dir(folder.at("folder.exr")).unwrap();
     for (line, parts) in [
         ("render s.toml -o o.png --vertices kept.csv", ["kept.csv: cannot be written", "read-only"]),
         ("render s.toml -o o.png --exr folder.exr", ["folder.exr: cannot be written", "a folder"]),
@@ -174,6 +142,7 @@ fn what_cannot_be_written_is_found_at_the_start() {
         ("render s.toml -o o.png --error s.toml/e.png", ["s.toml/e.png: cannot be written", "no folder s.toml"]),
         #[cfg(target_os = "linux")]
         ("render s.toml -o o.png --vertices /proc/v.csv", ["/proc/v.csv: cannot be written", ""]),
+        ("render s.toml -o gone/p_##.png", ["gone", "no folder gone"]),
         ("bake tri.obj -o gone/f.sf", ["gone/f.sf: cannot be written", "no folder gone"]),
         ("import model.gltf -o gone/m.toml", ["gone/m.toml: cannot be written", "no folder gone"]),
         ("compare a.png b.png -o gone/d.png", ["gone/d.png: cannot be written", "no folder gone"]),
@@ -189,11 +158,9 @@ fn a_late_failure_tells_what_is_written() {
         return;
     }
     let folder = folder();
-    let render = "render sphere_over_plane -o o.png --vertices v.csv --no-cache --quiet";
-    let program = command(folder.path(), &render.split(' ').chain(SMALL).collect::<Vec<_>>());
-    let mut limited = Command::new("sh");
-    limited.current_dir(folder.path()).args(["-c", "ulimit -f 64; exec \"$@\"", "sh"]);
-    let ran = finish(limited.arg(program.get_program()).args(program.get_args()));
+    let render =
+        folder.command(&format!("render sphere_over_plane -o o.png --vertices v.csv --no-cache --quiet {SMALL}"));
+    let ran = finish(&mut limited(&render, "ulimit -f 64"));
     assert_eq!((ran.code, ran.stderr.lines().count()), (1, 1), "{}", ran.stderr);
     assert!(ran.stderr.contains("v.csv: cannot be written: File too large"), "{}", ran.stderr);
     assert!(ran.stderr.trim_end().ends_with("already written: o.png"), "{}", ran.stderr);
@@ -218,15 +185,15 @@ fn ended(command: &mut Command, what: &str) -> Ran {
 #[test]
 fn inputs_that_are_no_files_are_refused_and_not_waited_for() {
     let folder = folder();
-    let at = |name: &str| folder.path().join(name);
+    let at = |name: &str| folder.at(name);
     for pipe in ["pipe.toml", "pipe.obj", "pipe.png", "pipe.glb", "pipe.sf", "pipe.json", "project.comp"] {
         let made = Command::new("mkfifo").arg(at(pipe)).status();
         assert!(made.is_ok_and(|status| status.success()), "mkfifo");
     }
-    std::fs::write(at("mesh.toml"), SCENE.replace("tri.obj", "pipe.obj")).unwrap();
-    std::fs::write(at("sky.toml"), SCENE.replace("sky_0003.png", "pipe.png")).unwrap();
-    std::fs::write(at("buffer.gltf"), MODEL.replace("the%20buffer.bin", "pipe.obj")).unwrap();
-    std::fs::write(at("texture.gltf"), MODEL.replace("paint.png", "pipe.png")).unwrap();
+    folder.write("mesh.toml", SCENE.replace("tri.obj", "pipe.obj"));
+    folder.write("sky.toml", SCENE.replace("sky_0003.png", "pipe.png"));
+    folder.write("buffer.gltf", MODEL.replace("the%20buffer.bin", "pipe.obj"));
+    folder.write("texture.gltf", MODEL.replace("paint.png", "pipe.png"));
     let socket = std::os::unix::net::UnixListener::bind(at("socket.toml")).unwrap();
     for (line, file) in [
         ("render pipe.toml -o o.png", "pipe.toml"),
@@ -246,14 +213,14 @@ fn inputs_that_are_no_files_are_refused_and_not_waited_for() {
         ("bake /dev/zero -o f.sf", "/dev/zero"),
         ("inspect /dev/zero", "/dev/zero"),
     ] {
-        let ran = ended(&mut command(folder.path(), &line.split(' ').collect::<Vec<_>>()), line);
+        let ran = ended(&mut folder.command(line), line);
         assert_eq!((ran.code, ran.stderr.lines().count()), (4, 1), "{line}: {}", ran.stderr);
         assert!(ran.stderr.contains(&format!("{file}: ")), "{line}: {}", ran.stderr);
     }
     drop(socket);
     if has_device() {
         let line = "bake tri.obj -o f.sf --face-px 4 --lattice cube:1x1 --shader-dir .";
-        let ran = ended(&mut command(folder.path(), &line.split(' ').collect::<Vec<_>>()), line);
+        let ran = ended(&mut folder.command(line), line);
         assert!(ran.code == 4 && ran.stderr.contains("project.comp: cannot be read"), "{} {}", ran.code, ran.stderr);
     }
 }

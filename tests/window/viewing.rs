@@ -1,8 +1,6 @@
 //! The program with its window on a virtual display.
 
-#![allow(dead_code)] // every test binary uses its own part
-
-use super::cli::{SMALL, command};
+use super::cli::{COARSE, command};
 use super::display::{Display, Running};
 use super::room;
 use std::io::{BufRead, BufReader};
@@ -14,6 +12,8 @@ use std::time::{Duration, Instant};
 pub const SIZE: [usize; 2] = [480, 320];
 /// How the lamp moves while the scene runs.
 pub const MOTION: &str = "motion = [{ bob = { amplitude_m = 0.2, period_s = 3 } }]";
+/// The window's size, and samples as `render` takes them.
+pub const OPTIONS: &str = "--size 480x320 --no-overlay --antialias samples --validation sync";
 pub const PATIENCE: Duration = Duration::from_secs(60);
 
 /// The program with its window, and the lines that it logs.
@@ -26,9 +26,9 @@ pub struct View<'d> {
 }
 
 impl<'d> View<'d> {
-    pub fn open(display: &'d Display, folder: &Path, arguments: &[&str]) -> Self {
-        let mut program = command(folder, &["view"]);
-        program.args(arguments).env("DISPLAY", &display.name).env_remove("WAYLAND_DISPLAY").arg("-v");
+    pub fn open(display: &'d Display, folder: &Path, line: &str) -> Self {
+        let mut program = command(folder, line);
+        program.env("DISPLAY", &display.name).env_remove("WAYLAND_DISPLAY").arg("-v");
         let mut child = program.stderr(Stdio::piped()).spawn().unwrap();
         let stderr = child.stderr.take().unwrap();
         let (sender, lines) = channel();
@@ -125,14 +125,5 @@ impl<'d> View<'d> {
 pub fn open<'d>(display: &'d Display, folder: &Path) -> View<'d> {
     let size = SIZE.map(|side| side as u32);
     room::write(folder, size, MOTION);
-    View::open(display, folder, &arguments())
-}
-
-/// Small bakes, the window's size, samples as `render` takes them.
-pub fn arguments() -> Vec<&'static str> {
-    let small = &SMALL[..4];
-    ["scene.toml", "--size", "480x320", "--paused", "--no-overlay", "--antialias", "samples", "--validation", "sync"]
-        .into_iter()
-        .chain(small.iter().copied())
-        .collect()
+    View::open(display, folder, &format!("view scene.toml --paused {OPTIONS} {COARSE}"))
 }

@@ -1,15 +1,7 @@
 //! The window's inside without a window: events and time in, pictures out, overlay included.
-#![cfg(feature = "view")]
 
-mod common;
-#[path = "common/room.rs"]
-mod room;
-#[path = "common/stage.rs"]
-mod stage;
-#[path = "common/window.rs"]
-mod window;
-
-use room::apart;
+use crate::room::apart;
+use crate::stand::{SIZE, Stand};
 use shadow_fields::bake;
 use shadow_fields::draw::Antialias;
 use shadow_fields::error::Error;
@@ -20,7 +12,6 @@ use shadow_fields::view::{Previewed, Setup};
 use std::collections::HashSet;
 use std::path::Path;
 use std::time::Duration;
-use window::{SIZE, Stand};
 
 /// What is shown, which is what `render` makes of the same state.
 fn as_rendered(stand: &mut Stand, when: &str) -> Vec<[u8; 4]> {
@@ -154,7 +145,6 @@ fn a_scene_that_stands_still_costs_only_its_showing() {
     assert!(!stand.viewer.wants_frame() || stand.viewer.idle().is_some());
 }
 
-/// A scene that is panned out of sight, changed there, and panned back, however edges are smoothed.
 /// A hand is quicker than a compiler: what its keys ask for is built once, when all of them are known.
 #[test]
 fn keys_that_wait_cost_one_rebuild() {
@@ -177,6 +167,7 @@ fn keys_that_wait_cost_one_rebuild() {
     as_rendered(&mut stand, "after nine");
 }
 
+/// A scene that is panned out of sight, changed there, and panned back, however edges are smoothed.
 #[test]
 fn a_scene_out_of_sight_is_shown_and_comes_back() {
     for antialias in [Antialias::None, Antialias::Outlines, Antialias::Samples] {

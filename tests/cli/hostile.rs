@@ -1,0 +1,202 @@
+//! Names, numbers and surroundings that nobody means well: the program neither panics nor passes them to the terminal,
+//! and ends with the exit code that the reason has.
+#![cfg(unix)]
+
+use crate::cli::{COARSE, Folder, bare, finish, limited, names, without_drivers};
+use crate::common;
+use shadow_fields::error::is_deceptive;
+use std::ffi::OsStr;
+use std::os::unix::ffi::OsStrExt;
+use std::os::unix::fs::symlink;
+use std::process::Command;
+
+const TRIANGLE: &str = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n";
+const BAKE: &str = "bake m.obj --lattice cube:2x3 --face-px 4";
+const RENDER: &str = "render sphere_over_plane --size 8x8 --lattice cube:2x3 --face-px 4";
+
+fn folder() -> Folder {
+    Folder::of(&[("m.obj", TRIANGLE)])
+}
+
+fn with_device() -> Option<Folder> {
+    crate::cli::has_device().then(folder)
+}
+
+/// No control or bidirectional character but the ends of lines.
+fn assert_clean(text: &str) {
+    assert!(text.chars().all(|c| c == '\n' || !is_deceptive(c)), "{text:?}");
+}
+
+#[test]
+fn paths_are_bytes() {
+    let Some(folder) = with_device() else { return };
+    let name = |text: &'static [u8]| OsStr::from_bytes(text);
+    let ends = |command: &mut Command, code: i32, made: &[&'static [u8]]| {
+        let ran = finish(command);
+        assert_eq!(ran.code, code, "{command:?}: {}", ran.stderr);
+        assert!(made.iter().all(|made| folder.path().join(name(made)).exists()), "{command:?}");
+    };
+    ends(folder.command(BAKE).arg("-o").arg(name(b"x\xff.sf")), 0, &[b"x\xff.sf"]);
+    std::fs::copy(folder.at("m.obj"), folder.path().join(name(b"m\xff.obj"))).unwrap();
+    let mut other = folder.bare("bake -o y.sf");
+    other.args(COARSE.split(' ')).arg(name(b"m\xff.obj")).arg("--cache-dir").arg(name(b"cache\xff"));
+    ends(&mut other, 0, &[b"y.sf", b"cache\xff"]);
+    ends(folder.command(RENDER).arg("-o").arg(name(b"p\xff.png")), 0, &[b"p\xff.png"]);
+    ends(folder.command(RENDER).arg("-o").arg(name(b"p\xff##.png")), 2, &[]);
+    ends(&mut folder.command("--face-px 4 render sphere_over_plane -o p.png"), 2, &[]);
+}
+
+#[test]
+fn control_characters_do_not_reach_the_terminal() {
+    let folder = folder();
+    for (line, code) in [
+        ("bake a\u{1b}[31m\nb.obj -o f.sf", 4),
+        ("bake m.obj -o a\u{1b}[31m\nb/f.sf", 1),
+        ("bake m.obj -o a\u{1b}[31m\nb.txt", 2),
+        ("inspect a\u{7}\r.sf", 4),
+        ("bake a\u{2028}b\u{202e}c.obj -o f.sf", 4),
+        ("bake m.obj -o a\u{2067}b\u{200f}.txt", 2),
+        ("render \u{1b}]0;title\u{7}.toml -o p.png", 4),
+    ] {
+        let ran = folder.run(line);
+        assert_clean(&ran.stderr);
+        assert_eq!((ran.code, ran.stderr.lines().count()), (code, 1), "{}", ran.stderr);
+    }
+    for argument in ["--size=\u{1b}[31m9", "--\u{1b}[31mwhat", "\u{1b}[31m"] {
+        let ran = folder.run(&format!("render s.toml -o p.png {argument}"));
+        assert_clean(&ran.stderr);
+        assert!(ran.code == 2 && ran.stderr.contains("\\u{1b}"), "{} {}", ran.code, ran.stderr);
+    }
+    // Headers of pictures.
+    let scene = "[camera]\neye = [0, 0, 5]\ntarget = [0, 0, 0]\n[environment]\nimage = { file = \"sky.hdr\" }\n";
+    folder.write("s.toml", scene);
+    for header in [
+        "#?RADIANCE\n\u{1b}[31mFORMAT=x\n\n",
+        "#?RADIANCE\nFORMAT=\u{1b}[31mx\n\n",
+        "#?RADIANCE\n\n-Y \u{1b}[31m +X 4\n",
+    ] {
+        folder.write("sky.hdr", header);
+        let ran = folder.run("render s.toml -o p.png");
+        assert_clean(&ran.stderr);
+        assert_eq!((ran.code, ran.stderr.lines().count()), (4, 1), "{}", ran.stderr);
+    }
+    // Results show names of files too, and are JSON where that is asked for.
+    folder.write("m.gltf", r#"{ "asset": { "version": "2.0" }, "scenes": [{ "nodes": [] }] }"#);
+    let name = "a\u{202e}b\u{85}c.toml";
+    assert_clean(&folder.good(&format!("import m.gltf -o {name}")).stdout);
+    let said = folder.good(&format!("import m.gltf -o {name} --json")).stdout;
+    assert_clean(&said);
+    let report: serde_json::Value = serde_json::from_str(&said).unwrap();
+    assert_eq!(report["file"], name);
+}
+
+#[test]
+fn links_in_a_circle_are_no_output() {
+    let Some(folder) = with_device() else { return };
+    symlink("two.sf", folder.at("one.sf")).unwrap();
+    symlink("one.sf", folder.at("two.sf")).unwrap();
+    let ran = folder.run(&format!("{BAKE} -o one.sf"));
+    assert_eq!(ran.code, 1, "{}", ran.stderr);
+    assert!(folder.at("one.sf").is_symlink());
+    assert_eq!(folder.names(), ["m.obj", "one.sf", "two.sf"]);
+}
+
+#[test]
+#[cfg(target_os = "linux")]
+fn full_devices_are_told_alike() {
+    let Some(folder) = with_device() else { return };
+    for command in [BAKE, RENDER] {
+        let ran = folder.run(&format!("{command} -o /dev/full"));
+        assert!(ran.code == 1 && ran.stderr.contains("/dev/full: cannot be written: No space left"), "{}", ran.stderr);
+    }
+    let full = std::fs::OpenOptions::new().write(true).open("/dev/full").unwrap();
+    let mut devices = folder.command("devices");
+    let ran = devices.stdout(full).stderr(std::process::Stdio::piped()).spawn().unwrap().wait_with_output().unwrap();
+    let text = String::from_utf8(ran.stderr).unwrap();
+    assert_eq!(ran.status.code(), Some(1), "{text}");
+    assert!(text.lines().count() == 1 && text.starts_with("shadow-fields: stdout: "), "{text}");
+    let ran = folder.run(&format!("{RENDER} -o /proc/x.png"));
+    assert!(ran.code == 1 && !ran.stderr.contains("unfinished"), "{}", ran.stderr);
+}
+
+/// A write beyond the limit on file sizes raises a signal that would end the program without a word.
+#[test]
+fn a_limit_on_file_sizes_is_an_error() {
+    let Some(folder) = with_device() else { return };
+    let bake = folder.command(&format!("{BAKE} -o f.sf --no-cache"));
+    let ran = finish(&mut limited(&bake, "ulimit -f 2"));
+    assert_eq!(ran.code, 1, "{}", ran.stderr);
+    assert!(ran.stderr.contains("f.sf: cannot be written: File too large"), "{}", ran.stderr);
+    assert_eq!(folder.names(), ["m.obj"]);
+}
+
+/// What memory a picture takes is compared with what there is before anything is baked for it.
+#[test]
+#[cfg(target_os = "linux")]
+fn a_picture_larger_than_memory_is_refused_with_numbers() {
+    let folder = folder();
+    // Four million KiB of address space: less than 20 bytes for each of 2^28 pixels.
+    let cramped =
+        |line: &str| finish(&mut limited(&folder.bare(&format!("{line} --cache-dir cache")), "ulimit -v 4000000"));
+    if cramped("devices").code != 0 {
+        return common::skip("no device opens in 4 GB of addresses");
+    }
+    let ran = cramped("render sphere_over_plane --size 16384x16384 -o p.png");
+    assert_eq!(ran.code, 4, "{}", ran.stderr);
+    let line = ran.stderr.lines().last().unwrap();
+    assert!(line.contains("a picture of 16384x16384 pixels takes ") && line.ends_with(" GB left"), "{line}");
+    assert!(!folder.at("cache/fields").exists() && !folder.at("p.png").exists());
+}
+
+/// A shader of many bands takes long to compile: the terminal says so, unless it is to be left alone.
+#[test]
+fn a_terminal_is_told_what_is_compiled() {
+    if !crate::cli::has_device() {
+        return;
+    }
+    let terminal = |more: &str| {
+        let folder = folder();
+        let program = env!("CARGO_BIN_EXE_shadow-fields");
+        let line = format!(
+            "'{program}' {RENDER} -o p.png --antialias none --variant storage --bands 5 --cache-dir cache {more}"
+        );
+        // `script` runs a command on a terminal of its own and prints what that shows.
+        let mut script = Command::new("script");
+        let ran = script.current_dir(folder.path()).env("TERM", "xterm").args(["-qec", &line, "/dev/null"]).output();
+        ran.ok().map(|ran| (ran.status.success(), String::from_utf8_lossy(&ran.stdout).into_owned()))
+    };
+    let Some((good, shown)) = terminal("") else { return common::skip("no script (Debian's package is bsdutils)") };
+    assert!(good && shown.contains("compiling shader merge.comp, "), "{shown}");
+    for more in ["--quiet", "--no-progress"] {
+        let (good, shown) = terminal(more).unwrap();
+        assert!(good && !shown.contains("compiling"), "{shown}");
+    }
+}
+
+/// What killed runs left is gone after the next run, in the folder of results and in the cache.
+#[test]
+fn leftovers_of_killed_runs_are_swept() {
+    let Some(folder) = with_device() else { return };
+    let places = ["", "cache", "cache/fields", "cache/spirv"].map(|place| folder.at(place));
+    for place in &places {
+        std::fs::create_dir_all(place).unwrap();
+        std::fs::write(place.join(".unfinished-killed"), "half").unwrap();
+    }
+    let ran = finish(&mut bare(folder.path(), &format!("{BAKE} -o f.sf --cache-dir cache")));
+    assert_eq!(ran.code, 0, "{}", ran.stderr);
+    for place in &places {
+        assert!(!names(place).iter().any(|name| name.starts_with(".unfinished-")), "{}", place.display());
+    }
+}
+
+#[test]
+fn a_broken_description_of_a_driver_is_no_driver() {
+    let folder = Folder::of(&[("icd.json", "{ \"ICD\": \u{1b}")]);
+    let mut devices = folder.command("devices");
+    without_drivers(&mut devices).env("VK_DRIVER_FILES", "icd.json").env("VK_ICD_FILENAMES", "icd.json");
+    let ran = finish(&mut devices);
+    assert_eq!(ran.code, 3, "{}", ran.stderr);
+    let lines: Vec<&str> = ran.stderr.lines().collect();
+    assert!(lines.iter().any(|line| line.contains("icd.json: ") && line.contains("JSON")), "{}", ran.stderr);
+    assert_clean(&ran.stderr);
+}

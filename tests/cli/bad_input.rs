@@ -16,7 +16,7 @@ fn folder() -> Folder {
     Folder::of(&[("s.toml", &format!("{CAMERA}{BALL}")), ("m.obj", TRIANGLE)])
 }
 
-/// All that the readers refuse is in `tests/bad_input.rs`.
+/// All that the readers refuse is in `tests/files/bad_input.rs`.
 #[test]
 fn meshes_and_scenes() {
     let folder = Folder::new();

@@ -12,9 +12,12 @@ use bytemuck::Pod;
 use glam::Vec3;
 use shadow_fields::asset::Mesh;
 use shadow_fields::bake::Baker;
+use shadow_fields::bake::cache::Cache;
 use shadow_fields::bake::capture::{Capture, Slots};
 use shadow_fields::check;
+use shadow_fields::frame::{self, Frame};
 use shadow_fields::gpu::{Device, DeviceOptions, Validation};
+use shadow_fields::scene::Scene;
 use shadow_fields::shaders::Library;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, MutexGuard, OnceLock};
@@ -88,6 +91,11 @@ impl Gpu {
     /// A baker on the shared device.
     pub fn baker(&self) -> Baker {
         Baker::new(&self.device, &self.library)
+    }
+
+    /// A scene on the shared device, baked anew.
+    pub fn frame(&self, scene: &Scene, options: frame::Options) -> Frame {
+        Frame::new(&self.baker(), &Cache::new(None), scene, options, &|_, _, _| ()).unwrap()
     }
 
     /// Captures the faces of a batch and brings the atlas to the host; `C` values of `T` a texel.

@@ -1,6 +1,6 @@
 //! Field files: what was written comes back, and nothing else is ever taken for a field.
 
-use crate::generate;
+use crate::common::generate;
 use fastrand::Rng;
 use serde::Serialize;
 use shadow_fields::Error;

@@ -1,6 +1,6 @@
 //! Meshes: generators against closed forms, derived properties, the enclosing sphere, and OBJ files there and back.
 
-use crate::generate;
+use crate::common::generate;
 use std::f64::consts::{PI, TAU};
 use std::path::Path;
 

@@ -1,5 +1,6 @@
 //! glTF files: scenes, motion, surfaces, what is refused, and the commands that take them.
 
+mod allowed;
 #[path = "../common/cli.rs"]
 mod cli;
 mod cli_of_gltf;

@@ -7,6 +7,7 @@ mod capture;
 #[path = "../common/mod.rs"]
 mod common;
 mod draw;
+mod field;
 mod flight;
 mod gloss;
 mod hidden;
@@ -15,12 +16,16 @@ mod light;
 mod merge;
 mod order;
 mod project;
+mod renderer;
 mod self_visibility;
 mod shadow_map;
+mod sharp;
 mod sharp_motion;
 mod sheet;
+mod silhouette;
 mod skip;
 mod stability;
 #[path = "../common/stage.rs"]
 mod stage;
 mod transparent;
+mod validation;

@@ -6,7 +6,6 @@ use common::{gpu, report};
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 use shadow_fields::asset::embedded;
-use shadow_fields::bake::cache::Cache;
 use shadow_fields::check::sharp as check;
 use shadow_fields::draw::{Antialias, Shading};
 use shadow_fields::frame::{self, Frame};
@@ -39,7 +38,7 @@ fn frame(gpu: &common::Gpu, scene: &Scene) -> Frame {
     let bake = shadow_fields::bake::Options { silhouette: Default::default(), ..base.bake };
     let options =
         frame::Options { bake, shading: Some(Shading::Pixel), size: PICTURE, antialias: Antialias::None, ..base };
-    Frame::new(&gpu.baker(), &Cache::new(None), scene, options, &|_, _, _| ()).unwrap()
+    gpu.frame(scene, options)
 }
 
 fn ball(placement: &Placement) -> (DVec3, f64) {

@@ -1,12 +1,9 @@
 //! Baked fields and transfers: against closed forms, against each other, and through the cache.
 
 mod cache;
-#[path = "../common/mod.rs"]
-mod common;
 mod transfer;
 
-use common::generate;
-use common::{Gpu, gpu, library, report};
+use crate::common::{self, Gpu, generate, gpu, library, report};
 use fastrand::Rng;
 use glam::{DVec3, Vec3};
 use half::f16;

@@ -1,8 +1,6 @@
 //! The front door: scenes made in code, light and pictures by `Renderer`, and what it refuses.
 
-mod common;
-
-use common::gpu;
+use crate::common::gpu;
 use glam::{Quat, Vec3};
 use shadow_fields::asset::environment::EnvironmentData;
 use shadow_fields::bake;
@@ -177,7 +175,7 @@ fn a_renderer_lights_its_scene_at_once_and_refuses_what_is_no_placement() {
 
 #[test]
 fn a_device_that_is_named_wrongly_is_refused() {
-    if common::gpu().is_none() {
+    if gpu().is_none() {
         return;
     }
     let options = DeviceOptions { device: Some("no such device".into()), ..Default::default() };

@@ -1,7 +1,5 @@
 //! Distant light: projections against a quadrature rule and closed forms, and the orientation of pictures.
 
-#[path = "../common/mod.rs"]
-mod common;
 mod sun;
 
 use std::f64::consts::PI;
@@ -246,7 +244,7 @@ fn hdr_pictures_are_read_and_oversized_ones_refused_before_memory_is_taken() {
     assert_eq!(sky.radiance(DVec3::new(0.01, 0.1, -1.0).normalize())[0], 6.0, "row 1, column 4: the 12th pixel");
     assert_eq!(sky.radiance(DVec3::NEG_Y)[0], 96.0);
     let hdr = b"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 50000 +X 100000\n".to_vec();
-    for bytes in [common::huge_png(), hdr] {
+    for bytes in [crate::common::huge_png(), hdr] {
         let source =
             EnvironmentData { image: Some(EnvironmentImage { file: "big".into(), scale: 1.0 }), ..Default::default() };
         let error = Environment::new(&source, &|_: &Path| Ok(bytes.clone())).unwrap_err();

@@ -1,9 +1,8 @@
 //! What a frame with sharp lights shows once something is switched: an entity, a light, or the way in which edges are
 //! smoothed.
 
-use super::common::{gpu, report};
 use super::{HEAD, parse, scenes};
-use shadow_fields::bake::cache::Cache;
+use crate::common::{gpu, report};
 use shadow_fields::check::sharp as check;
 use shadow_fields::draw::{Antialias, Finish, Shading};
 use shadow_fields::frame::{self, Frame};
@@ -20,7 +19,7 @@ fn pixels_follow_switches_of_entities() {
         antialias: Antialias::None,
         ..check::sharp_options()
     };
-    let new = |scene: &Scene| Frame::new(&gpu.baker(), &Cache::new(None), scene, options, &|_, _, _| ()).unwrap();
+    let new = |scene: &Scene| gpu.frame(scene, options);
     let show = |frame: &mut Frame| {
         frame.render(&scene.at(0.0), Some(4.0)).unwrap();
         frame.picture()
@@ -46,7 +45,7 @@ fn edges_are_marked_where_pixels_read_them() {
     let (_, scene, _) = scenes().swap_remove(0);
     let new = |antialias| {
         let options = frame::Options { shading: None, size: [96, 72], antialias, ..check::sharp_options() };
-        Frame::new(&gpu.baker(), &Cache::new(None), &scene, options, &|_, _, _| ()).unwrap()
+        gpu.frame(&scene, options)
     };
     let show = |frame: &mut Frame| {
         frame.render(&scene.at(0.0), Some(4.0)).unwrap();
@@ -78,7 +77,7 @@ fn a_light_that_is_switched_on_meets_the_chains() {
     let mut dark = scene.clone();
     dark.entities[2].emits = false;
     let options = frame::Options { lights: Lights::Sh, ..check::sharp_options() };
-    let new = |scene: &Scene| Frame::new(&gpu.baker(), &Cache::new(None), scene, options, &|_, _, _| ()).unwrap();
+    let new = |scene: &Scene| gpu.frame(scene, options);
     let light = |frame: &mut Frame| {
         frame.render(&scene.at(0.0), None).unwrap();
         frame.radiosity(0).unwrap()
@@ -101,7 +100,7 @@ fn a_frame_covers_no_scene_whose_sharp_lights_have_no_pass() {
     let mut dark = scene.clone();
     dark.entities[2].emits = false;
     let options = check::sharp_options();
-    let frame = Frame::new(&gpu.baker(), &Cache::new(None), &dark, options, &|_, _, _| ()).unwrap();
+    let frame = gpu.frame(&dark, options);
     assert!(frame.covers(&dark) && !frame.covers(&scene));
 }
 
@@ -116,6 +115,6 @@ fn a_frame_of_balls_of_light_covers_no_panel_that_is_switched_on() {
     ));
     let mut dark = scene.clone();
     dark.entities.last_mut().unwrap().emits = false;
-    let frame = Frame::new(&gpu.baker(), &Cache::new(None), &dark, check::sharp_options(), &|_, _, _| ()).unwrap();
+    let frame = gpu.frame(&dark, check::sharp_options());
     assert!(frame.covers(&dark) && !frame.covers(&scene));
 }

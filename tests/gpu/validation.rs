@@ -1,10 +1,7 @@
 //! Those who watch are watched: the validation layer hears deliberate errors, and the tracker objects to every barrier
 //! that is left out.
 
-mod common;
-
-use common::generate;
-use common::{Gpu, gpu, library, report};
+use crate::common::{Gpu, generate, gpu, library, report};
 use shadow_fields::bake::assemble::Assemble;
 use shadow_fields::bake::{self, Baker};
 use shadow_fields::field::{FieldKind, Storage};

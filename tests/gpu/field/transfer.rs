@@ -1,7 +1,7 @@
 //! Baked transfer vectors.
 
-use super::common::{generate, report};
 use super::{difference, norm, quiet, torus};
+use crate::common::{generate, report};
 use glam::{DVec3, Vec3};
 use shadow_fields::asset::Mesh;
 use shadow_fields::bake::surfaces::GroupPlan;

@@ -1,10 +1,7 @@
 //! Silhouette fields: the pass against its twin, a ball against the overlap of two discs, and whole meshes against
 //! rays.
 
-mod common;
-
-use common::generate;
-use common::{Gpu, gpu, pot, report};
+use crate::common::{Gpu, generate, gpu, pot, report};
 use glam::{DVec3, Vec3};
 use shadow_fields::asset::Mesh;
 use shadow_fields::bake::silhouette::{SilhouetteOptions, bake_silhouette};

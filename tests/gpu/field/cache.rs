@@ -1,7 +1,7 @@
 //! Baked fields and transfers through the cache.
 
-use super::common::{generate, gpu, library, open};
 use super::{quiet, small, torus};
+use crate::common::{generate, gpu, library, open};
 use glam::Vec3;
 use shadow_fields::asset::Mesh;
 use shadow_fields::bake::cache::Cache;

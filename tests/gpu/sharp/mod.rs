@@ -1,24 +1,21 @@
 //! Sharp lights: the pass against its twin, and scenes against rays that stop at a light's surface.
 
 mod change;
-#[path = "../common/mod.rs"]
-mod common;
 
-use common::{gpu, report};
+use crate::common::{Gpu, gpu, report};
 use shadow_fields::asset::embedded;
-use shadow_fields::bake::cache::Cache;
 use shadow_fields::check::sharp as check;
 use shadow_fields::draw::{Antialias, Shading};
-use shadow_fields::frame::{self, Frame};
+use shadow_fields::frame::{self};
 use shadow_fields::lists::scene_bounds::Counts;
 use shadow_fields::lists::skip::Skip;
 use shadow_fields::scene::{Lights, Scene};
 use shadow_fields::truth::{RayCast, RayMeshes, World, sample_vertices};
 
 /// Relative root mean square error of the light on vertices against rays.
-fn error(gpu: &common::Gpu, scene: &Scene, options: frame::Options, rays: u32) -> f64 {
+fn error(gpu: &Gpu, scene: &Scene, options: frame::Options, rays: u32) -> f64 {
     let placements = scene.at(0.0);
-    let mut frame = Frame::new(&gpu.baker(), &Cache::new(None), scene, options, &|_, _, _| ()).unwrap();
+    let mut frame = gpu.frame(scene, options);
     frame.render(&placements, None).unwrap();
     let shapes = RayMeshes::new(scene);
     let vertices = sample_vertices(scene, 800, 3);
@@ -186,14 +183,14 @@ fn spots_that_cannot_be_are_refused() {
 }
 
 /// A picture of a scene, linear RGB, and the pixels that evaluated lights where the device counts them.
-fn picture(gpu: &common::Gpu, scene: &Scene, shading: Shading) -> (Vec<f32>, Option<u64>) {
+fn picture(gpu: &Gpu, scene: &Scene, shading: Shading) -> (Vec<f32>, Option<u64>) {
     let options = frame::Options {
         shading: Some(shading),
         size: [160, 120],
         antialias: Antialias::None,
         ..check::sharp_options()
     };
-    let mut frame = Frame::new(&gpu.baker(), &Cache::new(None), scene, options, &|_, _, _| ()).unwrap();
+    let mut frame = gpu.frame(scene, options);
     let timings = frame.render(&scene.at(0.0), Some(4.0)).unwrap();
     (frame.picture(), frame.pixels_evaluated(&timings))
 }
@@ -326,7 +323,7 @@ fn what_outlines_leave_off_lists_changes_nothing() {
         let placements = scene.at(0.0);
         let lit = |skip| {
             let options = frame::Options { skip, ..check::sharp_options() };
-            let mut frame = Frame::new(&gpu.baker(), &Cache::new(None), &scene, options, &|_, _, _| ()).unwrap();
+            let mut frame = gpu.frame(&scene, options);
             frame.render(&placements, None).unwrap();
             (frame.counts(&placements), frame.radiosity(0).unwrap())
         };
@@ -357,8 +354,7 @@ fn lights_add_up_where_points_leave_out_what_stands_beside() {
     };
     let scene = at(3.0);
     let lights: Vec<usize> = (0..scene.entities.len()).filter(|&j| scene.entities[j].emits).collect();
-    let new =
-        |scene: &Scene, options| Frame::new(&gpu.baker(), &Cache::new(None), scene, options, &|_, _, _| ()).unwrap();
+    let new = |scene: &Scene, options| gpu.frame(scene, options);
     let under = |shining: &[usize]| {
         let mut lit = scene.clone();
         lights.iter().for_each(|&j| lit.entities[j].emits = shining.contains(&j));
@@ -401,8 +397,7 @@ fn a_sun_lights_as_its_closed_form() {
         let scene = parse(&format!(
             "{HEAD}albedo = [1, 1, 1]\n[environment]\nsun = {{ toward = {toward:?}, angle_deg = {angle_deg:?}, radiance = [4, 2, 1] }}\n"
         ));
-        let mut frame =
-            Frame::new(&gpu.baker(), &Cache::new(None), &scene, check::sharp_options(), &|_, _, _| ()).unwrap();
+        let mut frame = gpu.frame(&scene, check::sharp_options());
         frame.render(&scene.at(0.0), None).unwrap();
         let [x, y, z] = toward;
         let cosine = y / f64::sqrt(x * x + y * y + z * z);

@@ -1,10 +1,7 @@
 //! glTF files that few programs write and the specification allows: they are read, and what is left out of them is
 //! said.
 
-#[path = "common/model.rs"]
-mod model;
-
-use model::{F32, I16, Model, U8, U16, U32, load, robot, room};
+use crate::model::{self, F32, I16, Model, U8, U16, U32, load, robot, room};
 use serde_json::{Value, json};
 use shadow_fields::scene::gltf;
 

@@ -27,37 +27,21 @@ const WARM_UP: f64 = 0.2;
 const MOST_GROWTH: f64 = 0.02;
 
 const SCENE: &str = r#"
-[camera]
-eye = [0, 1.5, 4]
-target = [0, 0, 0]
-[environment]
-gradient = { radiance = [0.3, 0.35, 0.4] }
-[[mesh]]
-name = "floor"
-plane = { size_m = 4, cells = 12 }
-[[mesh]]
-name = "ball"
-sphere = { radius_m = 0.5, subdivisions = 2 }
-[[mesh]]
-name = "ring"
-torus = { major_m = 0.5, minor_m = 0.15, segments = 16, sides = 8 }
-[[entity]]
-mesh = "floor"
-position = [0, -0.6, 0]
-[[entity]]
-mesh = "ball"
-position = [-0.8, 0, 0]
-motion = [{ bob = { amplitude_m = 0.2, period_s = 4 } }]
-[[entity]]
-mesh = "ring"
-position = [0.6, 0, 0]
-motion = [{ spin = { axis = [1, 1, 0], period_s = 4 } }]
-[[entity]]
-mesh = "ball"
-position = [0, 1.2, 1]
-scale = 0.3
-emission = [30, 24, 12]
-motion = [{ orbit = { centre = [0, 1.2, 0], period_s = 4 } }]
+camera = { eye = [0, 1.5, 4], target = [0, 0, 0] }
+environment = { gradient = { radiance = [0.3, 0.35, 0.4] } }
+mesh = [
+    { name = "floor", plane = { size_m = 4, cells = 12 } },
+    { name = "ball", sphere = { radius_m = 0.5, subdivisions = 2 } },
+    { name = "ring", torus = { major_m = 0.5, minor_m = 0.15, segments = 16, sides = 8 } },
+]
+entity = [
+    { mesh = "floor", position = [0, -0.6, 0] },
+    { mesh = "ball", position = [-0.8, 0, 0], motion = [{ bob = { amplitude_m = 0.2, period_s = 4 } }] },
+    { mesh = "ring", position = [0.6, 0, 0], motion = [{ spin = { axis = [1, 1, 0], period_s = 4 } }] },
+    { mesh = "ball", position = [0, 1.2, 1], scale = 0.3, emission = [30, 24, 12], motion = [
+        { orbit = { centre = [0, 1.2, 0], period_s = 4 } },
+    ] },
+]
 "#;
 const PERIOD_S: f64 = 4.0;
 

@@ -5,11 +5,11 @@
 #![cfg(unix)]
 
 use crate::cli::{bare, finish, has_device, names};
-use crate::common::report;
+use crate::common::{Running, report};
 use crate::room;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
-use std::process::{Child, Command, Stdio};
+use std::process::{Command, Stdio};
 use std::sync::OnceLock;
 use std::time::{Duration, Instant};
 
@@ -57,20 +57,9 @@ fn program(folder: &Path, arguments: &str) -> Command {
     bare(folder, &format!("{arguments} --cache-dir ../cache"))
 }
 
-/// A program that is killed with the test.
-struct Running(Child);
-
-impl Running {
-    fn start(command: &mut Command) -> Self {
-        Running(command.stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap())
-    }
-}
-
-impl Drop for Running {
-    fn drop(&mut self) {
-        let _ = self.0.kill();
-        let _ = self.0.wait();
-    }
+/// Starts a program, which is killed where it is dropped.
+fn start(command: &mut Command) -> Running {
+    Running(command.stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap())
 }
 
 /// What the commands make when nothing disturbs them, and how long they take then.
@@ -128,13 +117,13 @@ impl Good {
         let folders: Vec<_> = (0..crowd).map(|i| place(&self.inside, &format!("crowd-{i}"))).collect();
         let jobs: Vec<_> = (0..crowd).map(|i| if i == 0 { job } else { random.usize(0..COMMANDS.len()) }).collect();
         let _ = std::fs::remove_dir_all(self.cache().join("fields"));
-        let start = Instant::now();
+        let begun = Instant::now();
         let mut running: Vec<_> = folders
             .iter()
             .zip(&jobs)
             .map(|(folder, &job)| {
-                let end = start + self.took[job].mul_f64(1.2 * random.f64() * crowd as f64);
-                (end, Running::start(&mut program(folder, COMMANDS[job].0)))
+                let end = begun + self.took[job].mul_f64(1.2 * random.f64() * crowd as f64);
+                (end, start(&mut program(folder, COMMANDS[job].0)))
             })
             .collect();
         running.sort_by_key(|(end, _)| *end);

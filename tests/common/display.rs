@@ -2,21 +2,11 @@
 
 #![allow(dead_code)] // every test binary uses its own part
 
-use super::common;
+use super::common::{self, Running};
 use std::cell::RefCell;
 use std::io::{BufRead, BufReader};
 use std::path::{Path, PathBuf};
-use std::process::{Child, Command, Stdio};
-
-/// A program that is ended with the test.
-pub struct Running(pub Child);
-
-impl Drop for Running {
-    fn drop(&mut self) {
-        let _ = self.0.kill();
-        let _ = self.0.wait();
-    }
-}
+use std::process::{Command, Stdio};
 
 /// A virtual display that writes its pixels to a file.
 pub struct Display {

@@ -20,6 +20,7 @@ use shadow_fields::gpu::{Device, DeviceOptions, Validation};
 use shadow_fields::scene::Scene;
 use shadow_fields::shaders::Library;
 use std::path::{Path, PathBuf};
+use std::process::Child;
 use std::sync::{Arc, Mutex, MutexGuard, OnceLock};
 
 /// Whether what is missing is a failure rather than a reason to skip.
@@ -38,6 +39,16 @@ pub fn skip(reason: &str) {
 #[allow(clippy::print_stderr)]
 pub fn report(line: &str) {
     eprintln!("{line}");
+}
+
+/// A program that is ended with the test.
+pub struct Running(pub Child);
+
+impl Drop for Running {
+    fn drop(&mut self) {
+        let _ = self.0.kill();
+        let _ = self.0.wait();
+    }
 }
 
 /// Folder that all tests share for compiled shaders and pipelines.

@@ -6,18 +6,17 @@ use shadow_fields::asset::embedded;
 use shadow_fields::scene::Scene;
 use std::path::{Path, PathBuf};
 
-const ROOM: &str = r#"
-[camera]
-eye = [0, 1.5, 5]
-target = [0, 0, 0]
-[environment]
-gradient = { radiance = [0.3, 0.35, 0.4] }
-[[mesh]]
-name = "floor"
-plane = { size_m = 6, cells = 24 }
-[[mesh]]
-name = "ball"
-sphere = { radius_m = 0.6, subdivisions = 2 }
+/// Its text for pictures of a size, with more keys of the lamp.
+pub fn text([width, height]: [u32; 2], of_the_lamp: &str) -> String {
+    format!(
+        r#"
+output = {{ width = {width}, height = {height} }}
+camera = {{ eye = [0, 1.5, 5], target = [0, 0, 0] }}
+environment = {{ gradient = {{ radiance = [0.3, 0.35, 0.4] }} }}
+mesh = [
+    {{ name = "floor", plane = {{ size_m = 6, cells = 24 }} }},
+    {{ name = "ball", sphere = {{ radius_m = 0.6, subdivisions = 2 }} }},
+]
 [[entity]]
 name = "floor"
 mesh = "floor"
@@ -31,11 +30,9 @@ mesh = "ball"
 position = [1.4, 1.1, 0]
 scale = 0.3
 emission = [30, 24, 12]
-"#;
-
-/// Its text for pictures of a size, with more keys of the lamp.
-pub fn text([width, height]: [u32; 2], of_the_lamp: &str) -> String {
-    format!("[output]\nwidth = {width}\nheight = {height}\n{ROOM}{of_the_lamp}\n")
+{of_the_lamp}
+"#
+    )
 }
 
 /// The scene, with the lamp at rest.

@@ -26,18 +26,11 @@ const DRAFT: [&str; 6] = ["--quality", "draft", "--lattice", "cube:4x3", "--face
 const SCENE: &str = r#"
 camera = { eye = [0, 1, 4], target = [0, 0, 0] }
 environment = { gradient = { radiance = [0.3, 0.35, 0.4] } }
-[[mesh]]
-name = "floor"
-plane = { size_m = 4, cells = 2 }
-[[mesh]]
-name = "ring"
-file = "meshes/a.obj"
-[[entity]]
-mesh = "floor"
-position = [0, -0.9, 0]
-[[entity]]
-mesh = "ring"
-motion = [{ spin = { period_s = 3 } }]
+mesh = [{ name = "floor", plane = { size_m = 4, cells = 2 } }, { name = "ring", file = "meshes/a.obj" }]
+entity = [
+    { mesh = "floor", position = [0, -0.9, 0] },
+    { mesh = "ring", motion = [{ spin = { period_s = 3 } }] },
+]
 "#;
 
 /// Meshes of a farm: a ring and balls.

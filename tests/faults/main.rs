@@ -29,26 +29,19 @@ use sweep::Job;
 const SCENE: &str = r#"
 output = { width = 12, height = 8 }
 environment = { gradient = { radiance = [0.3, 0.35, 0.4] } }
-[camera]
-eye = [0, 1, 4]
-target = [0, 0, 0]
-[[mesh]]
-name = "floor"
-plane = { size_m = 4, cells = 2 }
-[[mesh]]
-name = "ball"
-sphere = { radius_m = 0.6, subdivisions = 1 }
-[[entity]]
-mesh = "floor"
-position = [0, -0.6, 0]
-[[entity]]
-mesh = "ball"
-[[entity]]
-mesh = "ball"
-position = [1.2, 1, 0]
-scale = 0.3
-emission = [30, 24, 12]
-motion = [{ spin = { period_s = 3 } }, { bob = { amplitude_m = 0.2, period_s = 1 } }]
+camera = { eye = [0, 1, 4], target = [0, 0, 0] }
+mesh = [
+    { name = "floor", plane = { size_m = 4, cells = 2 } },
+    { name = "ball", sphere = { radius_m = 0.6, subdivisions = 1 } },
+]
+entity = [
+    { mesh = "floor", position = [0, -0.6, 0] },
+    { mesh = "ball" },
+    { mesh = "ball", position = [1.2, 1, 0], scale = 0.3, emission = [30, 24, 12], motion = [
+        { spin = { period_s = 3 } },
+        { bob = { amplitude_m = 0.2, period_s = 1 } },
+    ] },
+]
 "#;
 
 /// Dented, so that its field is captured.

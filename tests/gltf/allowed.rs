@@ -110,7 +110,6 @@ fn accessors_without_a_view_are_zeros() {
         assert!(notes.contains("shapes without an area"), "{notes}");
         copies += 1;
     }
-    println!("accessors without a bufferView: {copies} copies");
     assert!(copies > 80);
 }
 
@@ -154,7 +153,6 @@ fn channels_without_a_node_are_left_out() {
             copies += 1;
         }
     }
-    println!("channels without a node: {copies} copies");
     assert!(copies > 20);
 }
 
@@ -217,7 +215,6 @@ fn whole_numbers_may_have_a_point_or_an_exponent() {
             }
         }
     }
-    println!("whole numbers with a point or an exponent: {copies} copies");
     assert!(copies > 1000);
     // Broken numbers and negative ones are no indices.
     let json: Value = serde_json::from_str(&text(&room())).unwrap();

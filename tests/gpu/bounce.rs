@@ -108,42 +108,20 @@ fn what_moves_is_lit_by_what_rests() {
 
 /// Three things that move over a floor, under a sky: a ball, a tall box and a ring, nearly touching it.
 const THINGS: &str = r#"
-[camera]
-eye = [0.5, 1.8, 3.2]
-target = [0, 0.3, 0]
-[environment]
-sky = { sun_elevation_deg = 50, sun_azimuth_deg = 60, radiance = 0.8, sun = 0 }
-[[mesh]]
-name = "floor"
-cuboid = { size_m = [3, 0.1, 3], cells = 24 }
-[[mesh]]
-name = "ball"
-sphere = { radius_m = 0.4, subdivisions = 3 }
-[[mesh]]
-name = "ring"
-torus = { major_m = 0.35, minor_m = 0.13, segments = 40, sides = 20 }
-[[mesh]]
-name = "box"
-cuboid = { size_m = [0.5, 0.9, 0.5], cells = 8 }
-[[entity]]
-mesh = "floor"
-position = [0, -0.05, 0]
-albedo = [0.7, 0.7, 0.7]
-[[entity]]
-mesh = "ball"
-position = [0.7, 0.45, 0.2]
-albedo = [0.8, 0.15, 0.1]
-motion = [{ spin = { period_s = 9 } }]
-[[entity]]
-mesh = "ring"
-position = [-0.1, 0.2, 0.7]
-albedo = [0.15, 0.7, 0.2]
-motion = [{ spin = { period_s = 9 } }]
-[[entity]]
-mesh = "box"
-position = [-0.6, 0.48, -0.2]
-albedo = [0.8, 0.8, 0.8]
-motion = [{ spin = { period_s = 9 } }]
+camera = { eye = [0.5, 1.8, 3.2], target = [0, 0.3, 0] }
+environment = { sky = { sun_elevation_deg = 50, sun_azimuth_deg = 60, radiance = 0.8, sun = 0 } }
+mesh = [
+    { name = "floor", cuboid = { size_m = [3, 0.1, 3], cells = 24 } },
+    { name = "ball", sphere = { radius_m = 0.4, subdivisions = 3 } },
+    { name = "ring", torus = { major_m = 0.35, minor_m = 0.13, segments = 40, sides = 20 } },
+    { name = "box", cuboid = { size_m = [0.5, 0.9, 0.5], cells = 8 } },
+]
+entity = [
+    { mesh = "floor", position = [0, -0.05, 0], albedo = [0.7, 0.7, 0.7] },
+    { mesh = "ball", position = [0.7, 0.45, 0.2], albedo = [0.8, 0.15, 0.1], motion = [{ spin = { period_s = 9 } }] },
+    { mesh = "ring", position = [-0.1, 0.2, 0.7], albedo = [0.15, 0.7, 0.2], motion = [{ spin = { period_s = 9 } }] },
+    { mesh = "box", position = [-0.6, 0.48, -0.2], albedo = [0.8, 0.8, 0.8], motion = [{ spin = { period_s = 9 } }] },
+]
 "#;
 
 /// Of these, as they are usually baked but with small captures.

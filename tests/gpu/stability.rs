@@ -2,15 +2,13 @@
 
 use crate::{common, stage};
 use common::report;
-use glam::{DQuat, DVec3, Quat, Vec3};
 use shadow_fields::bake;
 use shadow_fields::bench::trials::{cases, run};
 use shadow_fields::check;
 use shadow_fields::field::Storage;
 use shadow_fields::frame;
 use shadow_fields::lists::skip::Skip;
-use shadow_fields::scene::{Placement, Scene};
-use shadow_fields::sh::Rotation;
+use shadow_fields::scene::Scene;
 use stage::{scene, small, stage};
 
 #[test]
@@ -64,32 +62,6 @@ fn merges_of_many_occluders_stay_bounded() {
                 "{count} balls, distinct {distinct}: at most {worst:.4} of the open floor, at least {least:.4}"
             ));
             assert!(worst <= 1.0 + 1e-6 && least >= 0.0, "{count} balls, distinct {distinct}: {least} to {worst}");
-        }
-    }
-}
-
-/// A million turns of a hundredth of a degree in f32: the frame's rotation of what comes out keeps lengths, normalised
-/// or not.
-#[test]
-fn a_million_small_turns_keep_lengths() {
-    let axis = DVec3::new(0.48, 0.6, 0.64);
-    let step = DQuat::from_axis_angle(axis, 0.01_f64.to_radians()).as_quat();
-    for normalise in [true, false] {
-        let mut turned = Quat::IDENTITY;
-        for _ in 0..1_000_000 {
-            turned = step * turned;
-            if normalise {
-                turned = turned.normalize();
-            }
-        }
-        let rotation = Rotation::new(4, Placement { position: Vec3::ZERO, rotation: turned, scale: 1.0 }.turn());
-        for k in 0..16 {
-            let mut unit = [0.0; 16];
-            let mut out = [0.0; 16];
-            unit[k] = 1.0;
-            rotation.apply(&unit, &mut out);
-            let length = out.iter().map(|c| c * c).sum::<f64>();
-            assert!((length - 1.0).abs() < 1e-9, "normalised {normalise}: {length}");
         }
     }
 }

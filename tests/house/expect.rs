@@ -1,30 +1,23 @@
 //! `scripts/expect`: outputs of test runs against lists of expected failures. And the workflow of `docs/vulkan-ci.yml`, as far as
 //! files say.
 
-use std::path::Path;
+use crate::root;
 use std::process::{Command, Stdio};
-
-fn root() -> &'static Path {
-    Path::new(env!("CARGO_MANIFEST_DIR"))
-}
 
 /// Exit code and lines of the script for a list and an output.
 fn expect(list: &str, log: &str) -> (i32, Vec<String>) {
     let folder = tempfile::tempdir().unwrap();
-    let list_file = folder.path().join("list");
-    let log_file = folder.path().join("log");
-    std::fs::write(&list_file, list).unwrap();
-    std::fs::write(&log_file, log).unwrap();
-    let output = Command::new(root().join("scripts/expect")).arg("list").arg("log").current_dir(folder.path()).output();
-    let output = output.unwrap();
+    for (name, text) in [("list", list), ("log", log)] {
+        std::fs::write(folder.path().join(name), text).unwrap();
+    }
+    let ran = |words: &[&str]| {
+        let log = std::fs::File::open(folder.path().join("log")).unwrap();
+        let mut command = Command::new(root().join("scripts/expect"));
+        command.args(words).current_dir(folder.path()).stdin(Stdio::from(log)).output().unwrap()
+    };
+    let output = ran(&["list", "log"]);
     let text = String::from_utf8(output.stdout).unwrap();
-    let from_input = Command::new(root().join("scripts/expect"))
-        .arg("list")
-        .current_dir(folder.path())
-        .stdin(Stdio::from(std::fs::File::open(log_file).unwrap()))
-        .output()
-        .unwrap();
-    assert_eq!(text.as_bytes(), from_input.stdout, "a file or standard input");
+    assert_eq!(text.as_bytes(), ran(&["list"]).stdout, "a file or standard input");
     (output.status.code().unwrap(), text.lines().map(str::to_owned).collect())
 }
 

@@ -1,5 +1,6 @@
 //! The shape of the source tree: which module may use which, and that every shader is embedded.
 
+use crate::root;
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
@@ -41,10 +42,6 @@ const ORDER: &[&str] = &[
 
 /// The only modules that `gpu` may use: it knows nothing of what it is for.
 const GPU_USES: &[&str] = &["error", "files"];
-
-fn root() -> &'static Path {
-    Path::new(env!("CARGO_MANIFEST_DIR"))
-}
 
 fn files(folder: &str, endings: &[&str]) -> Vec<PathBuf> {
     let mut out = Vec::new();

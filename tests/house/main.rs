@@ -4,3 +4,7 @@ mod expect;
 mod features;
 mod layers;
 mod pages;
+
+fn root() -> &'static std::path::Path {
+    std::path::Path::new(env!("CARGO_MANIFEST_DIR"))
+}

@@ -1,5 +1,6 @@
 //! The pages name keys of scene files, commands and paths that exist.
 
+use crate::root;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 use std::process::Command;
@@ -10,10 +11,6 @@ use shadow_fields::scene::Data;
 const PAGES: [&str; 5] = ["README.md", "docs/scene.md", "docs/measured.md", "docs/ci.md", "docs/farm.md"];
 /// Folders at the top; what starts with one of them is a path.
 const FOLDERS: [&str; 7] = ["docs/", "src/", "glsl/", "assets/", "scripts/", "tests/", "examples/"];
-
-fn root() -> &'static Path {
-    Path::new(env!("CARGO_MANIFEST_DIR"))
-}
 
 fn page(name: &str) -> String {
     std::fs::read_to_string(root().join(name)).unwrap_or_else(|error| panic!("{name}: {error}"))

@@ -1,7 +1,8 @@
 //! The program with its window on a virtual display.
 
 use super::cli::{COARSE, command};
-use super::display::{Display, Running};
+use super::common::Running;
+use super::display::Display;
 use super::room;
 use std::io::{BufRead, BufReader};
 use std::path::Path;

@@ -14,6 +14,11 @@ fn build(source: &EnvironmentData) -> Environment {
     Environment::new(source, &|path: &Path| Ok(std::fs::read(path).unwrap())).unwrap()
 }
 
+/// The light of a picture.
+fn of_image(file: &Path, scale: f32) -> EnvironmentData {
+    EnvironmentData { image: Some(EnvironmentImage { file: file.into(), scale }), ..Default::default() }
+}
+
 /// Slow twin: radiance times basis, summed over a product rule of the given degree.
 fn by_rule(environment: &Environment, bands: usize, degree: usize) -> [Vec<f64>; 3] {
     let mut sum = [(); 3].map(|()| vec![0.0; bands * bands]);
@@ -86,7 +91,7 @@ fn picture_orientation() {
     // 8 x 4: red = column, green = row.
     let pixels: Vec<f32> = (0..32).flat_map(|i| [(i % 8) as f32, (i / 8) as f32, 1.0]).collect();
     write_exr(&file, 8, 4, &pixels).unwrap();
-    let sky = build(&EnvironmentData { image: Some(EnvironmentImage { file, scale: 2.0 }), ..Default::default() });
+    let sky = build(&of_image(&file, 2.0));
     let at = |x: f64, y: f64, z: f64| sky.radiance(DVec3::new(x, y, z).normalize()).map(|c| c / 2.0);
     assert_eq!(at(0.01, 0.01, -1.0), [4.0, 1.0, 1.0], "ahead, just right of the middle and above it");
     assert_eq!(at(-0.01, -0.01, -1.0), [3.0, 2.0, 1.0]);
@@ -104,10 +109,7 @@ fn picture_projection() {
     let (width, height) = (256usize, 128usize);
     // A white picture has the coefficients of a uniform sky exactly in band 0: solid angles sum to 4 pi.
     write_exr(&file, 256, 128, &vec![1.0; width * height * 3]).unwrap();
-    let white = build(&EnvironmentData {
-        image: Some(EnvironmentImage { file: file.clone(), scale: 1.0 }),
-        ..Default::default()
-    });
+    let white = build(&of_image(&file, 1.0));
     for channel in white.coefficients(4) {
         assert!((channel[0] - (4.0 * PI).sqrt()).abs() < 1e-9);
         assert!(channel[1..].iter().all(|c| c.abs() < 1e-12), "{channel:?}");
@@ -124,7 +126,7 @@ fn picture_projection() {
         }
     }
     write_exr(&file, 256, 128, &pixels).unwrap();
-    let drawn = build(&EnvironmentData { image: Some(EnvironmentImage { file, scale: 1.0 }), ..Default::default() });
+    let drawn = build(&of_image(&file, 1.0));
     agree(&drawn.coefficients(5), &light.coefficients(5), 3e-4);
 }
 
@@ -133,7 +135,7 @@ fn png_pictures_are_decoded_from_srgb() {
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("sky.png");
     write_png(&file, 2, 1, &[0.18, 0.5, 1.0, 0.18, 0.5, 1.0], 0.0).unwrap();
-    let sky = build(&EnvironmentData { image: Some(EnvironmentImage { file, scale: 1.0 }), ..Default::default() });
+    let sky = build(&of_image(&file, 1.0));
     for (value, expected) in sky.radiance(DVec3::X).into_iter().zip([0.18, 0.5, 1.0]) {
         // One 8-bit step at mid grey is about 0.8 %.
         assert!((value - expected).abs() < 5e-3, "{value} {expected}");
@@ -145,7 +147,7 @@ fn picture(width: u32, height: u32, red: &[f32], bands: usize) -> Vec<f64> {
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("sky.exr");
     write_exr(&file, width, height, &red.iter().flat_map(|r| [*r, 0.0, 0.0]).collect::<Vec<_>>()).unwrap();
-    let sky = build(&EnvironmentData { image: Some(EnvironmentImage { file, scale: 1.0 }), ..Default::default() });
+    let sky = build(&of_image(&file, 1.0));
     let [red, green, blue] = sky.coefficients(bands);
     assert!(green.iter().chain(&blue).all(|c| *c == 0.0));
     red
@@ -200,12 +202,7 @@ fn a_turn_carries_everything_along() {
     };
     let of = |pixels: &[f32], turn_deg: f32| {
         write_exr(&file, 8, 3, pixels).unwrap();
-        build(&EnvironmentData {
-            image: Some(EnvironmentImage { file: file.clone(), scale: 0.5 }),
-            turn_deg,
-            ..Default::default()
-        })
-        .coefficients(6)
+        build(&EnvironmentData { turn_deg, ..of_image(&file, 0.5) }).coefficients(6)
     };
     agree(&of(&columns(0), 90.0), &of(&columns(2), 0.0), 1e-9);
 }
@@ -215,14 +212,12 @@ fn a_picture_is_kept_under_another_description() {
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("sky.exr");
     write_exr(&file, 2, 1, &[1.0; 6]).unwrap();
-    let source =
-        EnvironmentData { image: Some(EnvironmentImage { file: file.clone(), scale: 1.0 }), ..Default::default() };
+    let source = of_image(&file, 1.0);
     let sky = build(&source);
     std::fs::remove_file(&file).unwrap();
     let brighter = sky.with(&EnvironmentData { strength: 2.0, ..source.clone() }).unwrap();
     assert_eq!(brighter.radiance(DVec3::X), [2.0; 3]);
-    let other = EnvironmentImage { file: "other.exr".into(), scale: 1.0 };
-    assert!(sky.with(&EnvironmentData { image: Some(other), ..Default::default() }).is_err());
+    assert!(sky.with(&of_image(Path::new("other.exr"), 1.0)).is_err());
     assert!(sky.with(&EnvironmentData::default()).unwrap().is_none());
     let dark = sky.with(&EnvironmentData { strength: 0.0, ..source }).unwrap();
     assert!(dark.is_none() && dark.coefficients(3).iter().flatten().all(|c| *c == 0.0));
@@ -237,16 +232,12 @@ fn hdr_pictures_are_read_and_oversized_ones_refused_before_memory_is_taken() {
     let pixels: Vec<image::Rgb<f32>> = (0..32).map(|i| image::Rgb([0.75 * 2.0_f32.powi(i / 4), 0.375, 12.0])).collect();
     let bytes = std::fs::File::create(&file).unwrap();
     image::codecs::hdr::HdrEncoder::new(bytes).encode(&pixels, 8, 4).unwrap();
-    let sky = build(&EnvironmentData {
-        image: Some(EnvironmentImage { file: file.clone(), scale: 1.0 }),
-        ..Default::default()
-    });
+    let sky = build(&of_image(&file, 1.0));
     assert_eq!(sky.radiance(DVec3::new(0.01, 0.1, -1.0).normalize())[0], 6.0, "row 1, column 4: the 12th pixel");
     assert_eq!(sky.radiance(DVec3::NEG_Y)[0], 96.0);
     let hdr = b"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 50000 +X 100000\n".to_vec();
     for bytes in [crate::common::huge_png(), hdr] {
-        let source =
-            EnvironmentData { image: Some(EnvironmentImage { file: "big".into(), scale: 1.0 }), ..Default::default() };
+        let source = of_image(Path::new("big"), 1.0);
         let error = Environment::new(&source, &|_: &Path| Ok(bytes.clone())).unwrap_err();
         assert_eq!(error.exit_code(), 4);
         assert!(error.to_string().contains("16384 x 8192 pixels"), "{error}");

@@ -3,7 +3,7 @@
 
 use crate::common;
 use common::generate;
-use common::{Gpu, gpu, report};
+use common::{Gpu, gpu};
 use glam::Vec3;
 use shadow_fields::asset::Mesh;
 use shadow_fields::bake::silhouette::{SilhouetteOptions, bake_silhouette};
@@ -54,7 +54,6 @@ fn fields_are_those_of_the_whole_mesh() {
         let ((found, with, texels), (wanted, without, none)) = (field(&gpu, &mesh, true), field(&gpu, &mesh, false));
         let off = off(&found, &wanted);
         let times = without.triangles as f64 / with.triangles as f64;
-        report(&format!("{}: {times:.1} times fewer triangles, off by {off:.5}", mesh.name));
         assert!(texels > 0.0 && none == 0.0);
         assert!(times > least, "{}: only {times:.2} times fewer triangles", mesh.name);
         assert!(off < OFF, "{}: {off}", mesh.name);
@@ -82,7 +81,6 @@ fn outlines_are_those_of_the_whole_mesh() {
     let steps = |(a, b): (&u8, &u8)| (i32::from(a.cast_signed()) - i32::from(b.cast_signed())).abs();
     let all = found.payload().len();
     let differing = found.payload().iter().zip(wanted.payload()).filter(|pair| steps(*pair) > 4).count();
-    report(&format!("{differing} of {all} bytes differ by more than four steps"));
     assert!(100 * differing < all, "{differing} of {all}");
 }
 

@@ -2,7 +2,7 @@
 
 use crate::common;
 use common::generate;
-use common::{gpu, report};
+use common::gpu;
 use glam::DVec3;
 use shadow_fields::asset::Mesh;
 use shadow_fields::bake::cache::Cache;
@@ -44,7 +44,6 @@ fn the_same_mesh_under_two_names_is_baked_once() {
     let same = buffers(&meshes(["a", "b"], [8, 8]));
     let other = buffers(&meshes(["a", "b"], [8, 10]));
     let names = |buffers: &SceneBuffers| buffers.baked.iter().map(|b| b.what.clone()).collect::<Vec<_>>();
-    report(&format!("{:?} and {:?}", names(&same), names(&other)));
     assert_eq!(names(&same), ["a shadow", "a view"]);
     assert_eq!(names(&other), ["a shadow", "b shadow", "a view", "b view"]);
     assert!(same.fields.size_bytes < other.fields.size_bytes);
@@ -94,6 +93,5 @@ fn samples_inside_a_solid_are_captured_off_its_surface() {
         sum += (blocked[0] - seen).powi(2);
     }
     let off = (sum / 12.0).sqrt();
-    report(&format!("{} samples inside; off by {off:.3}", found.filled));
     assert!(off < 0.1, "{off}");
 }

@@ -1,7 +1,7 @@
 //! Light that bounces within a rigid group, against the closed form of a hollow sphere: of all that leaves one place of
 //! its inside, every other place receives the same.
 
-use super::common::{generate, report};
+use super::common::generate;
 use super::stage::{Stage, small, stage};
 use glam::Vec3;
 use shadow_fields::asset::{Mesh, embedded};
@@ -160,7 +160,6 @@ fn what_moves_and_what_rests_light_each_other() {
             (squares[0] / squares[1]).sqrt()
         };
         let [without, with] = [error(&direct), error(found)];
-        report(&format!("{bounces} bounces: {with:.4} relative RMS, {without:.4} without"));
         assert!(with < most && without > 2.4 * with, "{bounces}: {with}, {without} without");
     }
 }
@@ -185,7 +184,6 @@ fn no_light_jumps_as_a_thing_moves() {
         }
         before = Some(now);
     }
-    report(&format!("light changes by {most:.4} of the brightest a tenth of a millimetre"));
     assert!(most > 0.0 && most < 0.002, "{most}");
 }
 

@@ -3,7 +3,7 @@
 
 use crate::common;
 use common::generate;
-use common::{Gpu, gpu, pot, report};
+use common::{Gpu, gpu, pot};
 use glam::{Quat, Vec3};
 use shadow_fields::asset::Mesh;
 use shadow_fields::bake::capture::{Capture, Model, NO_SLOT, Way};
@@ -53,7 +53,6 @@ fn coverage_is_what_rays_meet() {
         let eyes = [eyes_outside(), more].concat();
         for way in WAYS {
             let found = check::coverage(&gpu.baker(), &mesh, &eyes, FACE_PX, way).unwrap();
-            report(&format!("{}, {way:?}: {found:?}", mesh.name));
             assert_eq!(found.off_edge, 0, "{}, {way:?}: texels differ where there is no edge", mesh.name);
             assert_eq!(found.left_out_wrongly, 0, "{}: a face was left out that shows the object", mesh.name);
             assert!(found.left_out > 0, "{}: no face was left out", mesh.name);
@@ -141,7 +140,6 @@ fn colours_are_what_rays_meet() {
     let Some(gpu) = gpu() else { return };
     for mesh in [painted_box(true), painted_box(false), generate::torus_two_colour(0.5, 0.15, 48, 20)] {
         let off = check::colors(&gpu.baker(), &mesh, &eyes_outside(), FACE_PX).unwrap();
-        report(&format!("{}: {off:.1e} of the texels differ", mesh.name));
         assert!(off < 2.0 * differing_limit(&gpu.device), "{}: {off} of the texels differ", mesh.name);
     }
 }

@@ -1,7 +1,6 @@
 //! Pictures: what stands where, what hides what, and in which colour.
 
-use crate::{common, stage};
-use common::report;
+use crate::stage;
 use glam::{Quat, Vec2, Vec3};
 use shadow_fields::asset::environment::EnvironmentData;
 use shadow_fields::asset::mesh::Attributes;
@@ -74,10 +73,10 @@ fn things_stand_where_they_should() {
     ] {
         let [found_x, found_y, area] = see(place);
         let expected = [WIDTH as f32 / 2.0 + px_per_m * x, HEIGHT as f32 / 2.0 + px_per_m * y];
-        report(&format!("{place:?}: at {found_x:.2}, {found_y:.2} for {expected:?}, {area:.1} pixels"));
         // A sphere off the axis is seen as an ellipse whose middle lies a little further out.
         let tolerance = 0.1 + 0.25 * (x * x + y * y);
-        assert!((found_x - expected[0]).abs() < tolerance && (found_y - expected[1]).abs() < tolerance);
+        let off = [found_x - expected[0], found_y - expected[1]].map(f32::abs);
+        assert!(off.iter().all(|off| *off < tolerance), "{place:?}: at {found_x}, {found_y} for {expected:?}");
         let disc = std::f32::consts::PI * (0.4 * px_per_m).powi(2);
         assert!((area / disc - 1.0).abs() < 0.08, "{area} of {disc} pixels");
     }
@@ -224,7 +223,6 @@ fn outlines_are_smoother_than_four_samples() {
         (squares.sum::<f64>() / wanted.len() as f64).sqrt()
     };
     let [none, samples, outlines] = [none, samples, outlines].map(|picture| error(&picture));
-    report(&format!("error of a pixel: none {none:.4}, samples {samples:.4}, outlines {outlines:.4}"));
     assert!(outlines < 0.4 * none && outlines < samples, "none {none}, samples {samples}, outlines {outlines}");
 }
 
@@ -268,7 +266,6 @@ fn slivers_are_no_brighter_than_their_vertices() {
         frame.render(&scene.at(0.0), Some(f32::INFINITY)).unwrap();
         frame.picture().into_iter().fold(0.0, f32::max)
     });
-    report(&format!("slivers of at most {most}: {within} within them, {beyond} extrapolated"));
     assert!((0.2..most + 1e-3).contains(&within), "{within}");
     assert!(beyond > 2.0 * most, "the slivers are no test: {beyond}");
 }

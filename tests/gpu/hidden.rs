@@ -1,8 +1,7 @@
 //! What the camera cannot see is not lit while things move, and not drawn: no picture shows it, and it is lit once it
 //! may be seen or once nothing moves.
 
-use crate::{common, stage};
-use common::report;
+use crate::stage;
 use glam::{Quat, Vec3};
 use shadow_fields::draw::{Antialias, Finish};
 use shadow_fields::frame::{self, Frame};
@@ -95,7 +94,6 @@ fn pictures_are_the_same_to_the_bit() {
             assert_eq!(now[1].stale_clusters, 0);
             (0..2).for_each(|i| merged[i] += now[i].merged_clusters);
         }
-        report(&format!("{antialias:?}: {} clusters merged, {} without the skip", merged[0], merged[1]));
         assert!(4 * merged[0] < 3 * merged[1], "{merged:?}");
         // For a screen too.
         placements[1] = jostled(&placements[1], &mut rng);
@@ -139,7 +137,6 @@ fn what_comes_into_view_is_lit_then() {
     placements[1].position.x += 0.01;
     let [found, wanted] = frames.each_mut().map(|frame| picture(frame, &placements));
     assert!(found == wanted);
-    report(&format!("{stale} clusters were hidden, {} are from behind", frames[0].stale_count()));
     // At rest what is hidden is lit once, and after that a camera that moves lights nothing.
     let passes = |frame: &mut Frame| {
         let passes = frame.render(&placements, Some(1.0)).unwrap();

@@ -1,7 +1,6 @@
 //! What the merged light must be, whatever the implementation: closed forms, symmetries, continuity. All on the device.
 
-use crate::{common, stage};
-use common::report;
+use crate::stage;
 use glam::{DVec3, Quat, Vec3};
 use shadow_fields::bake;
 use shadow_fields::frame;
@@ -52,7 +51,6 @@ fn white_furnace() {
     let light = lit(&scene, small(), &stage);
     assert_eq!(light.len(), 27);
     let worst = light.iter().flatten().flatten().fold(0.0_f32, |m, b| m.max((b - 1.0).abs()));
-    report(&format!("white furnace: {worst:.1e}"));
     assert!(worst < 1e-3, "{worst:e}");
 }
 
@@ -78,7 +76,6 @@ fn occluder_from_zenith_to_nadir() {
 fn carry_around(skip: Skip, irradiance: &mut dyn FnMut(f64, f64) -> f64) {
     for distance in [1.3, 2.0, 3.0, 5.0, 8.0, 12.0, 30.0] {
         let (found, expected) = (irradiance(distance, 0.0), 1.0 - distance.powi(-2));
-        report(&format!("sphere at the zenith, {distance} r: {found:.4}, closed form {expected:.4}"));
         // The band-limited cosine is off by up to .02 where it meets a cap; far away only in proportion to the cap.
         let tolerance = 0.025_f64.min(0.15 * distance.powi(-2)) + 1e-4;
         assert!((found - expected).abs() < tolerance, "{distance} r: {found} for {expected}");
@@ -98,7 +95,6 @@ fn carry_around(skip: Skip, irradiance: &mut dyn FnMut(f64, f64) -> f64) {
             }
         }
         let pop = pop(&walk);
-        report(&format!("{distance} r: {off:.5} from closed form, {below:.5} below the horizon, pop {pop:.1e}"));
         // What is left is the sampling of the field: rasterised faces and interpolation, in proportion to the cap.
         assert!(off < 0.06 * distance.powi(-2) + 1e-4, "{distance} r: {off} from the closed form");
         // Four bands of the cosine reach .0625 at the nadir: a cap of 30 degrees there still takes .0097 where nothing
@@ -185,7 +181,6 @@ fn no_jumps_along_lines_past_an_occluder() {
                     lines += 1;
                 }
             }
-            report(&format!("lines around {x}, {y} m: largest step above slope {worst:.1e}"));
             // Shells are steps of the half-angle of the bounding sphere, which has a vertical tangent where the sphere
             // is crossed: there the slope itself grows within one step. Samples fitted to being interpolated leave
             // small corners between cells, and linear pieces larger ones between tetrahedra, where one step may be steeper
@@ -259,7 +254,6 @@ fn one_motion_of_everything_changes_nothing() {
         let turned = group(rotation * key);
         let after = stage.light(&mut stage.frame(&turned, small()), &moved(&placements, rotation, shift, 1.0));
         let worst = before.iter().zip(&after).map(|(a, b)| difference(a, b).0).fold(0.0, f32::max);
-        report(&format!("rigid motion: {worst:.1e}"));
         assert!(worst < 1e-4, "{worst:e}");
     }
     // The test can fail: without its environment the group does change.
@@ -278,7 +272,6 @@ fn size_does_not_matter() {
     for scale in [1e-3, 1e3] {
         let after = stage.light(&mut frame, &moved(&placements, Quat::IDENTITY, Vec3::ZERO, scale));
         let worst = before.iter().zip(&after).map(|(a, b)| difference(a, b).0).fold(0.0, f32::max);
-        report(&format!("scale {scale}: {worst:.1e}"));
         assert!(worst < 1e-4, "scale {scale}: {worst:e}");
     }
     // Large meshes instead of large scales: the fields are baked from other coordinates.
@@ -291,7 +284,6 @@ fn size_does_not_matter() {
     let plain = stage::scene(&text.replace("radius_m = R", "radius_m = 1").replace("scale = S", "scale = 1"));
     let (a, b) = (lit(&plain, small(), &stage), lit(&large(&text), small(), &stage));
     let (worst, _) = difference(&a[0], &b[0]);
-    report(&format!("mesh of 1 km at scale 1e-3: {worst:.1e}"));
     assert!(worst < 1e-4, "{worst:e}");
 }
 
@@ -321,7 +313,6 @@ fn spinning_sphere_shows_the_interpolation_error() {
         }
     }
     let rms = (square / (spins.len() * spins[0].len()) as f64).sqrt();
-    report(&format!("spinning sphere over a floor, defaults: {rms:.1e} RMS, {worst:.1e} at most, of a radiosity of 1"));
     assert!(worst > 1e-7, "the samples are not turned at all");
     assert!(rms < 1.5e-3 && worst < 2e-2, "{rms:e} RMS, {worst:e} at most");
 }

@@ -21,7 +21,6 @@ use std::sync::Arc;
 
 fn agrees(what: &str, frame: &mut Frame, placements: &[Placement]) {
     let worst = against_twin(frame, placements).unwrap().worst;
-    report(&format!("{what}: {worst:.1e}"));
     assert!(worst < ARITHMETIC, "{what}: {worst:e} of the brightest radiosity");
 }
 

@@ -2,8 +2,7 @@
 //! vertex, though a cluster has one list; among occluders there is one order for a whole receiver, by the distance from
 //! its centre in f32, ties by index, and what that differs from an order of each vertex's own is bounded here.
 
-use crate::{common, stage};
-use common::report;
+use crate::stage;
 use glam::DVec3;
 use shadow_fields::check::merge::ARITHMETIC;
 use shadow_fields::field::ShadowField;
@@ -123,9 +122,8 @@ fn before_or_behind_a_light_is_decided_by_the_vertex() {
     for place in [A, B, [0.02, 0.9995, 0.3], [-0.1, 0.995, 0.0]] {
         let (frame, light) = lit(&stage, &[place]);
         let (expected, orders) = by_vertex(&frame, &own);
-        report(&format!("{place:?}: {orders:?}, off by {:.1e}", apart(&light, &expected)));
         assert_eq!(orders.len(), 2, "before the light for some, behind it for others: {orders:?}");
-        assert!(apart(&light, &expected) < ARITHMETIC);
+        assert!(apart(&light, &expected) < ARITHMETIC, "{place:?}: {:e}", apart(&light, &expected));
         let (without, _) = lit(&stage, &[]);
         let (open, _) = by_vertex(&without, &own);
         assert!(apart(&light, &open) > 0.01, "the occluder counts at all");
@@ -144,9 +142,6 @@ fn two_occluders_about_as_far_as_a_light() {
     let (stated, _) = by_vertex(&frame, &|_, occluders| occluders.sort_unstable());
     let (other, _) = by_vertex(&frame, &|_, occluders| occluders.reverse());
     let [stated, other] = [stated, other].map(|expected| apart(&light, &expected));
-    report(&format!(
-        "{orders:?}; off from an order of each vertex's own by {from_own:.1e}, from that by index {stated:.1e}, reversed {other:.1e}"
-    ));
     assert!(orders.len() >= 4, "{orders:?}");
     assert!(stated < ARITHMETIC, "at a tie, by index: {stated:e}");
     assert!(other > 2.0 * ARITHMETIC, "the order can be told apart: {other:e}");
@@ -158,7 +153,6 @@ fn two_occluders_about_as_far_as_a_light() {
     let (expected, _) = by_vertex(&frame, &|_, occluders| occluders.reverse());
     assert!(apart(&turned, &expected) < ARITHMETIC, "by distance from the receiver's centre");
     let (step, brightest) = stage::difference(&turned, &light);
-    report(&format!("the order turns over: {:.1e} of the brightest", step / brightest));
     assert!(step < 2e-3 * brightest, "{step} of {brightest}");
 }
 

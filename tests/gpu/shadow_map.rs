@@ -1,7 +1,6 @@
 //! The shadow-map rival against rays: without occluders, in full shadow, and how its error falls.
 
-use crate::{common, stage};
-use common::report;
+use crate::stage;
 use shadow_fields::bench::shadow_map::{Filter, ShadowMaps, maps_apply};
 use shadow_fields::scene::Scene;
 use shadow_fields::truth::{RayCast, RayMeshes, World, receiver_vertices};
@@ -71,7 +70,6 @@ fn shadows_are_those_of_rays_but_for_their_edges() {
     for (name, scene) in &scenes {
         let hard = [64, 256, 1024].map(|px| error(&both(&stage, scene, Filter::Hard, px)));
         let soft = error(&both(&stage, scene, Filter::Pcss, 1024));
-        report(&format!("{name}: hard {hard:.4?}, PCSS {soft:.4}"));
         assert!(hard[2] < hard[0] && hard[2] < 0.25, "{name}: {hard:?}");
         assert!(soft < 0.6 * hard[2] && soft < 0.1, "{name}: {soft} against {hard:?}");
         // What lies deep in shadow has none of the light that casts it.
@@ -92,7 +90,6 @@ fn a_receiver_shadows_itself_and_no_more() {
         [[mesh]]\nname = \"ball\"\nsphere = { radius_m = 0.5, subdivisions = 3 }\n[[entity]]\nmesh = \"torus\"\n";
     let scene = scene(&format!("{text}{}", light([2.0, 1.5, 0.5], 0.4)));
     let soft = error(&both(&stage, &scene, Filter::Pcss, 1024));
-    report(&format!("torus: {soft:.4}"));
     assert!(soft < 0.08, "{soft}");
 }
 

@@ -1,7 +1,6 @@
 //! Sheets against rays: grounds, walls and ceilings that are rectangles, and what moves past them.
 
-use crate::{common, stage};
-use common::report;
+use crate::stage;
 use shadow_fields::bake::{self, Quality};
 use shadow_fields::frame;
 use shadow_fields::scene::{Lights, Scene};
@@ -46,7 +45,6 @@ fn an_object_on_a_ground_is_lit_as_by_rays() {
     let scene = scene(&text);
     let mut frame = stage.frame(&scene, defaults(Lights::Sharp));
     let found = error(&stage, &mut frame, &scene, 0.0, 1, 3);
-    report(&format!("teapot on a floor of 6 m under a uniform sky: {found:.4}"));
     assert!(found < 0.006, "{found}");
 }
 
@@ -72,7 +70,6 @@ fn a_ball_along_a_wall_and_over_an_edge() {
         walk.push(stage.light(&mut frame, &scene.at(time_s)).swap_remove(2));
         if step % 10 == 0 {
             let found = error(&stage, &mut frame, &scene, time_s, 2, 3);
-            report(&format!("{:.2} m from the ground's middle: {found:.4}", scene.at(time_s)[2].position.x));
             worst = worst.max(found);
         }
         // A step that neither neighbour's slope explains. Of single vertices near the ground's edge it is large in truth.
@@ -81,7 +78,6 @@ fn a_ball_along_a_wall_and_over_an_edge() {
             pop = pop.max(((0..a.len()).map(bend).sum::<f64>() / a.len() as f64).sqrt());
         }
     }
-    report(&format!("error at most {worst:.4}, second difference {pop:.4} RMS at most"));
     assert!(worst < 0.03, "{worst}");
     assert!(pop < 0.02, "{pop}");
 }
@@ -121,13 +117,11 @@ fn sheets_hide_sharp_lights() {
     for (name, (error, _)) in
         [("a low light", low), ("a light at the rim", rim), ("a tilted sheet", tilted), ("a ceiling lamp", under)]
     {
-        report(&format!("{name} and a sheet: {error:.4}"));
         assert!(error < 0.03, "{name}: {error}");
     }
     for lights in [Lights::Sharp, Lights::Sh] {
         let (_, through) = lit(&format!("{ceiling}{}", lamp(1.7)), lights);
         let (_, open) = lit(&lamp(1.7), lights);
-        report(&format!("{lights:?}: {through:.4} of {open:.4} come through a ceiling"));
         // Four bands know a ceiling that is 67 degrees wide as a soft one.
         assert!(through < if lights == Lights::Sharp { 1e-6 } else { 0.2 } * open, "{through} of {open}");
         let (_, beneath) = lit(&ball("[0, -0.6, 0]"), lights);

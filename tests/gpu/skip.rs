@@ -1,8 +1,7 @@
 //! What is not done: an unmoved scene merges nothing, and one in which something moves comes to the bits of a full
 //! merge; what is dropped as small stays within its bound.
 
-use crate::{common, stage};
-use common::report;
+use crate::stage;
 use glam::{Quat, Vec3};
 use shadow_fields::check::merge::{ARITHMETIC, against_twin};
 use shadow_fields::frame;
@@ -78,7 +77,6 @@ fn what_moves_is_merged_again_to_the_same_bits() {
             };
             assert!(same(&found, &expected), "round {round}, eps {eps}");
             let now = kept.merged();
-            report(&format!("eps {eps}, {movers:?} moved: {} of {} clusters", now.merged_clusters, now.clusters));
             if round > 0 && movers.is_empty() {
                 assert_eq!(now.merged_clusters, 0, "nothing has moved");
             }
@@ -127,8 +125,7 @@ fn exact_skips_change_nothing() {
     for name in exact.map(|row| row.name) {
         let mut frame = stage.frame(&scene, frame::Options { skip: Skip::without(name), ..small() });
         assert_eq!(stage.light(&mut frame, &placements), expected, "without {name}");
-        let counts = all.counts(&placements);
-        report(&format!("without {name}: {} entries, with it {entries}; {counts:?}", frame.merged().merged_entries));
+        let _counts = all.counts(&placements);
         assert!(name != "behind" || frame.merged().merged_entries > entries);
     }
 }
@@ -160,8 +157,7 @@ fn a_light_that_faces_away_is_left_off() {
     assert!(a[0].iter().flatten().all(|c| *c == 0.0), "no light goes down");
     assert!(a[1].iter().any(|c| c[0] > 0.05), "the ceiling is lit");
     let counts = with.counts(&placements);
-    report(&format!("{counts:?}"));
-    assert!(counts.facing_away > 0);
+    assert!(counts.facing_away > 0, "{counts:?}");
     // Black altogether, it is no light.
     let black = vec![Vec3::ZERO; scene.meshes[1].positions.len()];
     let lamp = &scene.meshes[1];
@@ -238,10 +234,6 @@ fn what_is_dropped_stays_within_its_bound() {
         let by_rays = pairs
             .flat_map(|(a, b)| (0..3).map(move |c| (a.radiosity[c] - b.radiosity[c]).abs()))
             .fold(0.0_f64, f64::max);
-        report(&format!(
-            "eps {eps}: {} of {} dropped, bound {:.4}, by rays {by_rays:.4}, merge {worst:.4} of {brightest:.3}",
-            counts.below_eps, counts.considered, counts.dropped_bound
-        ));
         assert!(
             counts.below_eps > 0 && f64::from(worst) <= counts.dropped_bound,
             "{worst} of {}",
@@ -295,11 +287,6 @@ fn nothing_pops_as_fields_become_caps() {
             .windows(3)
             .flat_map(|w| (0..64).map(move |v| apart_at(&w[0], v) - 2.0 * apart_at(&w[1], v) + apart_at(&w[2], v)))
             .fold(0.0_f32, |most, kink| most.max(kink.abs()));
-        report(&format!(
-            "{shape}: {:.4} of what is brightest apart, kink {:.5}, {kinds:?}",
-            apart / brightest,
-            kink / brightest
-        ));
         assert!(kinds.len() > 2, "the walk goes from field to cap: {kinds:?}");
         assert!(apart > 1e-5 && apart < 0.01 * brightest, "{shape}: {apart} of {brightest}");
         assert!(kink < 0.3 * apart, "{shape}: {kink} of {apart}");
@@ -326,7 +313,6 @@ fn nothing_pops_by_more_than_eps() {
             largest = largest.max(stage::difference(&light, &before).0);
         }
     }
-    report(&format!("largest step {largest:.5}"));
     assert!(dropped && largest <= eps, "{largest}");
     assert!(largest > eps / 5.0, "the step is seen at all: {largest}");
 }

@@ -1,7 +1,6 @@
 //! Odd places, sizes, numbers and meshes: everything finite, bounded, the same on a second run, and near its f64 twin.
 
-use crate::{common, stage};
-use common::report;
+use crate::stage;
 use shadow_fields::bake;
 use shadow_fields::bench::trials::{cases, run};
 use shadow_fields::check;
@@ -19,7 +18,6 @@ fn odd_scenes_stay_bounded() {
             let bake = bake::Options { storage, ..base.bake };
             let options = frame::Options { bake, skip: Skip::without("unmoved"), ..base };
             let trial = run(&case, stage.frame(&case.scene, options), storage).unwrap();
-            report(&format!("{trial:?}"));
             assert!(trial.passed, "{trial:?}");
         }
     }
@@ -58,9 +56,6 @@ fn merges_of_many_occluders_stay_bounded() {
             let found = light(&scene, options);
             let worst = found.iter().zip(&open).map(|(f, o)| f[0] / o[0]).fold(0.0, f32::max);
             let least = found.iter().map(|f| f[0]).fold(f32::INFINITY, f32::min);
-            report(&format!(
-                "{count} balls, distinct {distinct}: at most {worst:.4} of the open floor, at least {least:.4}"
-            ));
             assert!(worst <= 1.0 + 1e-6 && least >= 0.0, "{count} balls, distinct {distinct}: {least} to {worst}");
         }
     }

@@ -1,7 +1,6 @@
 //! What lets light through, everywhere or by its holes.
 
-use crate::{common, stage};
-use common::report;
+use crate::stage;
 use glam::{Vec2, Vec3};
 use shadow_fields::asset::Mesh;
 use shadow_fields::asset::environment::EnvironmentData;
@@ -44,7 +43,6 @@ fn glass_takes_its_share() {
                 let wanted: Vec<[f32; 3]> = open.iter().zip(&dense).map(mixed).collect();
                 let (off, most) = difference(&glass, &wanted);
                 let (shadow, _) = difference(&open, &dense);
-                report(&format!("{mesh} before a {what}, groups {groups}: {off:.1e} of {most:.2}, shadow {shadow:.2}"));
                 // An occluder that is part field and part cap takes its share twice: not quite in proportion.
                 assert!(off < 5e-4 * most && shadow > 0.2 * most, "{mesh}, {what}: {off}, {shadow} of {most}");
             }
@@ -67,7 +65,6 @@ fn glass_is_drawn_over_what_lies_behind_it() {
         frame.render(&scene.at(0.0), Some(1.0)).unwrap();
         let picture = frame.picture();
         let middle = Vec3::from_slice(&picture[3 * (32 * 64 + 32)..][..3]);
-        report(&format!("{antialias:?}: {middle}"));
         assert!((middle - Vec3::new(0.75, 0.375, 0.1)).abs().max_element() < 2e-3, "{antialias:?}: {middle}");
     }
 }
@@ -115,7 +112,6 @@ fn light_passes_holes() {
             stage.light(&mut frame, &scene.at(0.0)).swap_remove(0)
         };
         let (off, most) = difference(&lit(true), &lit(false));
-        report(&format!("groups {groups}: {off:.3} of {most:.2}"));
         assert!(off < limit * most, "groups {groups}: {off} of {most}");
     }
 }

@@ -3,7 +3,7 @@
 mod cache;
 mod transfer;
 
-use crate::common::{self, Gpu, generate, gpu, library, report};
+use crate::common::{self, Gpu, generate, gpu, library};
 use fastrand::Rng;
 use glam::{DVec3, Vec3};
 use half::f16;
@@ -92,7 +92,6 @@ fn sphere_has_its_closed_form() {
     let field = sphere_field(&gpu);
     assert_eq!(field.header.filled_samples, 0, "all shells lie outside");
     let (mean, largest) = sphere_error(field);
-    report(&format!("sphere, relative error of b: mean {mean:.4}, largest {largest:.3}"));
     // The bounds are those of an earlier lattice, 6 shells in equal steps of the logarithm: mean 0.032, largest 0.11.
     // The default has more shells, interpolates b / (1 - c), and stays below them.
     assert!(mean < 0.035 && largest < 0.12, "{mean} {largest}");
@@ -309,7 +308,6 @@ fn stored_halves_are_rounded_from_the_exact_numbers() {
             off_nearest += usize::from(half != nearest);
             off_zero += usize::from(half != towards_zero);
         }
-        report(&format!("{count} halves: {off_nearest} are not the nearest, {off_zero} not the next towards zero"));
         assert!(count > 2000 && 1000 * off_nearest.min(off_zero) <= count, "{off_nearest} and {off_zero} of {count}");
     }
 }

@@ -2,7 +2,7 @@
 //! smoothed.
 
 use super::{HEAD, parse, scenes};
-use crate::common::{gpu, report};
+use crate::common::gpu;
 use shadow_fields::check::sharp as check;
 use shadow_fields::draw::{Antialias, Finish, Shading};
 use shadow_fields::frame::{self, Frame};
@@ -56,8 +56,7 @@ fn edges_are_marked_where_pixels_read_them() {
     let (by_pixel, marks) = show(&mut new(Antialias::Samples));
     let mut frame = new(Antialias::Outlines);
     let (by_vertex, none) = show(&mut frame);
-    report(&format!("{marks} vertices are marked for pixels, {none} where vertices evaluate"));
-    assert!(marks > 100 && none == 0);
+    assert!(marks > 100 && none == 0, "{marks} vertices are marked for pixels, {none} where vertices evaluate");
     assert!(frame.still(&scene.at(0.0), 4.0).unwrap() == by_pixel, "a still picture");
     for (antialias, picture) in [(Antialias::Samples, &by_pixel), (Antialias::Outlines, &by_vertex)] {
         frame.set_finish(Finish::Linear, antialias).unwrap();

@@ -2,7 +2,7 @@
 
 mod change;
 
-use crate::common::{Gpu, gpu, report};
+use crate::common::{Gpu, gpu};
 use shadow_fields::asset::embedded;
 use shadow_fields::check::sharp as check;
 use shadow_fields::draw::{Antialias, Shading};
@@ -110,7 +110,6 @@ fn scenes_are_lit_as_by_rays() {
         let rays = if name == "a tube" { 16384 } else { 1024 };
         let found = error(&gpu, &scene, sharp, rays);
         let harmonics = error(&gpu, &scene, frame::Options { lights: Lights::Sh, ..sharp }, 1024);
-        report(&format!("{name}: error {found:.4}, in spherical harmonics {harmonics:.4}"));
         assert!(found < limit.min(harmonics), "{name}: {found}, in spherical harmonics {harmonics}");
     }
 }
@@ -141,7 +140,6 @@ fn spots_are_lit_as_by_rays() {
     ] {
         let scene = under_a_spot(spot, 60);
         let found = error(&gpu, &scene, sharp, 1024);
-        report(&format!("{name}: error {found:.4}"));
         assert!(found < 0.03, "{name}: {found}");
         if !spot.is_empty() {
             let harmonics = error(&gpu, &scene, frame::Options { lights: Lights::Sh, ..sharp }, 1024);
@@ -161,7 +159,6 @@ fn pixels_carry_the_rim_of_a_spot() {
         let square = |(a, b): (&f32, &f32)| f64::from(a - b).powi(2);
         (show(12, shading).iter().zip(&fine).map(square).sum::<f64>() / fine.len() as f64).sqrt()
     });
-    report(&format!("of 12 cells pixels are off by {pixels:.4}, vertices by {vertices:.4}"));
     assert!(pixels < 0.2 * vertices && vertices > 0.004, "{pixels} and {vertices}");
 }
 
@@ -216,7 +213,6 @@ fn pixels_carry_edges_that_vertices_do_not() {
     };
     for receiver in [plane, "cuboid = { size_m = [6, 0.0001, 6]"] {
         let [pixels, vertices] = [Shading::Pixel, Shading::Vertex].map(|shading| rms(show(receiver, 12, shading)));
-        report(&format!("{receiver}: of 12 cells pixels are off by {pixels:.4}, vertices by {vertices:.4}"));
         assert!(pixels < 0.2 * vertices && vertices > 0.004, "{receiver}: {pixels} and {vertices}");
     }
 }
@@ -283,7 +279,6 @@ fn faint_edges_are_left_to_vertices() {
     };
     let Some(alone) = evaluated("") else { return };
     let drowned = evaluated("[environment]\nuniform = [500, 500, 500]\n").unwrap();
-    report(&format!("{alone} pixels evaluate a light alone, {drowned} under a bright sky"));
     assert!(alone > 300 && drowned < alone / 10, "{alone} and {drowned}");
 }
 
@@ -304,9 +299,9 @@ fn pixels_that_nothing_shades_look_as_vertices_show_them() {
         [Shading::Vertex, Shading::Pixel].map(|shading| picture(&gpu, &scene, shading));
     let differ = |(a, b): &(&[f32], &[f32])| a.iter().zip(*b).any(|(a, b)| (a - b).abs() > 0.002);
     let differing = vertices.chunks_exact(3).zip(pixels.chunks_exact(3)).filter(differ).count() as u64;
-    report(&format!("{evaluated:?} pixels evaluate the sun, {differing} differ"));
     assert_eq!(none, None);
-    assert!(evaluated.is_none_or(|evaluated| evaluated > 500 && differing < evaluated / 10));
+    let few = evaluated.is_none_or(|evaluated| evaluated > 500 && differing < evaluated / 10);
+    assert!(few, "{evaluated:?} pixels evaluate the sun, {differing} differ");
     assert!(differing > 0, "the speck shades nothing");
 }
 
@@ -330,7 +325,6 @@ fn what_outlines_leave_off_lists_changes_nothing() {
         let (counts, light) = lit(Skip::ALL);
         let (without, kept) = lit(Skip::without(name));
         let left_off = |counts: &Counts| if name == "passed" { counts.passed_by } else { counts.covered };
-        report(&format!("{name}: {} of {} lookups, {} apart", left_off(&counts), counts.considered, counts.apart));
         assert!(left_off(&counts) > 0 && left_off(&without) == 0, "{name}");
         assert!(light == kept, "{name}: what is left off blocks exactly nothing or everything");
     }
@@ -369,7 +363,6 @@ fn lights_add_up_where_points_leave_out_what_stands_beside() {
     }
     let brightest = all.iter().copied().fold(0.0, f32::max);
     let apart = all.iter().zip(&sum).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max) / brightest;
-    report(&format!("{} lights on {} values: {apart:.1e} of the brightest apart", lights.len(), all.len()));
     assert!(lights.len() == 4 && apart < 2e-6, "{apart}");
 
     // A lamp below the floor, which alone is lit here.

@@ -131,3 +131,14 @@ pub fn huge_png() -> Vec<u8> {
     png.extend(b"\0\0\0\0IDAT\x35\xaf\x06\x1e\0\0\0\0IEND\xae\x42\x60\x82");
     png
 }
+
+/// Root mean square of what found numbers are off true ones by, relative to that of the true ones.
+pub fn relative_rms(found_and_true: impl IntoIterator<Item = (f64, f64)>) -> f64 {
+    let mut off = 0.0;
+    let mut whole = 0.0;
+    for (found, truth) in found_and_true {
+        off += (found - truth).powi(2);
+        whole += truth * truth;
+    }
+    (off / whole).sqrt()
+}

@@ -1,6 +1,6 @@
 //! The engines of others: Slurm, Dask, OpenJD, and lines of commands.
 
-use super::{Farm, MESHES, cli, common, finish, has_device, processes, whole};
+use super::{Farm, MESHES, cli, common, finish, processes, whole};
 use serde_json::Value;
 use std::path::Path;
 use std::process::{Command, Stdio};
@@ -36,11 +36,10 @@ fn succeeds(program: &str, arguments: &[&str]) -> bool {
 
 #[test]
 fn dask_runs_slices_in_two_workers() {
-    if !has_device() || !has_dask() {
+    if !has_dask() {
         return;
     }
-    let farm = Farm::new();
-    farm.plan();
+    let Some(farm) = Farm::planned() else { return };
     let mut submit = farm.command(&["farm", "submit", "p.json", "--engine", "dask", "--workers", "2", "-q"]);
     let ran = finish(submit.env("PATH", search_path()));
     assert_eq!(ran.code, 0, "{}", ran.stderr);
@@ -50,11 +49,7 @@ fn dask_runs_slices_in_two_workers() {
 /// A package that is missing and a scheduler that does not answer end in one line.
 #[test]
 fn a_dask_that_cannot_run_says_so_in_a_line() {
-    if !has_device() {
-        return;
-    }
-    let farm = Farm::new();
-    farm.plan();
+    let Some(farm) = Farm::planned() else { return };
     std::fs::create_dir(farm.path("stub")).unwrap();
     std::fs::write(farm.path("stub/distributed.py"), "raise ImportError").unwrap();
     let mut submit = farm.command(&["farm", "submit", "p.json", "--engine", "dask"]);
@@ -81,11 +76,7 @@ fn a_dask_that_cannot_run_says_so_in_a_line() {
 /// No path of a plan, whoever wrote it, becomes a line of a script.
 #[test]
 fn control_characters_in_paths_are_refused_by_plan_and_by_engines() {
-    if !has_device() {
-        return;
-    }
-    let farm = Farm::new();
-    farm.plan();
+    let Some(farm) = Farm::planned() else { return };
     let evil = "p\n$(touch x)\n.json";
     let refused = |ran: super::Ran, code, words: &[&str]| {
         assert_eq!((ran.code, ran.stdout.as_str()), (code, ""), "{words:?}: {}", ran.stderr);
@@ -128,11 +119,7 @@ fn control_characters_in_paths_are_refused_by_plan_and_by_engines() {
 
 #[test]
 fn templates_and_commands_are_what_other_farms_take() {
-    if !has_device() {
-        return;
-    }
-    let farm = Farm::new();
-    farm.plan();
+    let Some(farm) = Farm::planned() else { return };
     let commands = farm.good(&["farm", "submit", "p.json", "--engine", "print"]);
     assert_eq!(commands.lines().count(), MESHES);
     assert!(Command::new("sh").args(["-c", commands.lines().next().unwrap()]).output().unwrap().status.success());
@@ -182,11 +169,10 @@ fn slurm_runs_an_array_and_requeues_what_dies() {
         .iter()
         .all(|name| search_path().split(':').any(|folder| Path::new(folder).join(name).exists()));
     let root = std::fs::metadata("/proc/self").is_ok_and(|about| std::os::unix::fs::MetadataExt::uid(&about) == 0);
-    if !has_device() || !engine("Slurm", there && root) {
+    if !engine("Slurm", there && root) {
         return;
     }
-    let farm = Farm::new();
-    farm.plan();
+    let Some(farm) = Farm::planned() else { return };
     let node = SlurmNode(tempfile::tempdir().unwrap());
     assert!(node.script("start"));
     let submit = ["farm", "submit", "p.json", "--engine", "slurm", "--workers", "2"];

@@ -2,18 +2,14 @@
 //! wrong.
 
 use super::engines::{has_dask, search_path};
-use super::{Farm, MESHES, common, finish, has_device, processes, whole};
+use super::{Farm, MESHES, common, finish, processes, whole};
 use serde_json::{Value, json};
 use shadow_fields::farm::{Plan, results};
 use std::process::Command;
 
 #[test]
 fn damaged_results_and_slices_that_run_twice_at_once_end_well() {
-    if !has_device() {
-        return;
-    }
-    let farm = Farm::new();
-    farm.plan();
+    let Some(farm) = Farm::planned() else { return };
     let mut twice: Vec<_> =
         (0..2).map(|_| farm.command(&["farm", "run", "p.json", "--slice", "0", "-q"]).spawn().unwrap()).collect();
     assert!(twice.iter_mut().all(|process| process.wait().unwrap().success()));
@@ -49,11 +45,7 @@ fn damaged_results_and_slices_that_run_twice_at_once_end_well() {
 /// half-written.
 #[test]
 fn folders_that_cannot_be_written_lose_nothing() {
-    if !has_device() {
-        return;
-    }
-    let farm = Farm::new();
-    farm.plan();
+    let Some(farm) = Farm::planned() else { return };
     std::fs::create_dir(farm.path("results")).unwrap();
     for (words, how) in [
         (&["unshare", "-m", "sh"][..], "mount -t tmpfs -o size=8k none results"),
@@ -89,10 +81,7 @@ fn folders_that_cannot_be_written_lose_nothing() {
 /// Slices end when what waits for them is killed, and leave no result.
 #[test]
 fn slices_end_with_a_killed_submitter() {
-    if !has_device() {
-        return;
-    }
-    let farm = Farm::new();
+    let Some(farm) = Farm::with_device() else { return };
     farm.good(&["farm", "plan", "meshes/a.obj", "-o", "p.json", "--quality", "high"]);
     let slice = [farm.path("p.json").as_os_str().as_encoded_bytes(), b"\0"].concat();
     let wait = |seconds, what: &str, done: &dyn Fn() -> bool| {
@@ -144,12 +133,8 @@ fn descendants(parent: u32) -> Vec<u32> {
 /// done.
 #[test]
 fn kills_lose_at_most_the_slice() {
-    if !has_device() {
-        return;
-    }
+    let Some(farm) = Farm::planned() else { return };
     let kills: usize = std::env::var("SHADOW_FIELDS_FARM_KILLS").map_or(4, |text| text.parse().unwrap());
-    let farm = Farm::new();
-    farm.plan();
     let mut random = fastrand::Rng::with_seed(7);
     let mut done = 0;
     let mut killed = 0;

@@ -76,6 +76,21 @@ impl Farm {
         Farm { folder }
     }
 
+    /// `None` where there is no device.
+    fn with_device() -> Option<Self> {
+        has_device().then(Self::new)
+    }
+
+    /// One with the plan of its meshes, each a slice of its own.
+    fn planned() -> Option<Self> {
+        let farm = Self::with_device()?;
+        let mut plan = whole().plan.clone();
+        let slice = |index| json!({ "meshes": { "first": index, "count": 1 } });
+        plan["slices"] = (0..MESHES).map(slice).collect();
+        farm.write(&plan);
+        Some(farm)
+    }
+
     fn path(&self, name: &str) -> PathBuf {
         self.folder.path().join(name)
     }
@@ -100,14 +115,6 @@ impl Farm {
         let ran = self.run(words);
         assert_eq!(ran.code, 0, "{words:?}: {}", ran.stderr);
         ran.stdout
-    }
-
-    /// Writes the plan of the meshes, each a slice of its own.
-    fn plan(&self) {
-        let mut plan = whole().plan.clone();
-        let slice = |index| json!({ "meshes": { "first": index, "count": 1 } });
-        plan["slices"] = (0..MESHES).map(slice).collect();
-        self.write(&plan);
     }
 
     fn write(&self, plan: &Value) {
@@ -147,11 +154,7 @@ fn processes(words: &[u8]) -> Vec<u32> {
 
 #[test]
 fn slices_of_bakes_make_the_bytes_of_a_run_without_a_farm() {
-    if !has_device() {
-        return;
-    }
-    let farm = Farm::new();
-    farm.plan();
+    let Some(farm) = Farm::planned() else { return };
     let status: Value = serde_json::from_str(&farm.good(&["farm", "status", "p.json", "--json"])).unwrap();
     assert_eq!(status, json!({ "slices": 6, "done": 0 }));
     let early = farm.run(&["farm", "collect", "p.json", "--into", "cache"]);
@@ -184,27 +187,11 @@ fn slices_of_bakes_make_the_bytes_of_a_run_without_a_farm() {
 
 #[test]
 fn slices_of_pictures_are_those_of_render() {
-    if !has_device() {
-        return;
-    }
-    let farm = Farm::new();
+    let Some(farm) = Farm::with_device() else { return };
     std::fs::copy(farm.path("film.toml"), farm.path("other.toml")).unwrap();
     let options = [&["--size", "48x32", "--variant", "storage", "--time", "0.5"][..], &DRAFT].concat();
-    let plan = [
-        "farm",
-        "plan",
-        "film.toml",
-        "other.toml",
-        "--frames",
-        "5",
-        "--pictures",
-        "out/$_###.png",
-        "-o",
-        "p.json",
-        "--per-slice",
-        "3",
-    ];
-    let said = farm.good(&[&plan[..], &options].concat());
+    let plan = "farm plan film.toml other.toml --frames 5 --pictures out/$_###.png -o p.json --per-slice 3";
+    let said = farm.good(&plan.split(' ').chain(options.iter().copied()).collect::<Vec<_>>());
     assert!(said.contains("p.json: 4 slices"), "{said}");
     let slice = |film, first, count| json!({ "pictures": { "film": film, "first": first, "count": count } });
     assert_eq!(farm.read("p.json")["slices"], json!([slice(0, 0, 3), slice(0, 3, 2), slice(1, 0, 3), slice(1, 3, 2)]));

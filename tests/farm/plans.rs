@@ -1,7 +1,7 @@
 //! What is refused before any work is done: other programs, devices and inputs, and works and options that make no
 //! plan.
 
-use super::{DRAFT, Farm, has_device};
+use super::{DRAFT, Farm};
 use serde_json::{Value, json};
 use shadow_fields::farm::results::{self, SliceResult};
 use shadow_fields::farm::{Film, Input, Plan};
@@ -9,11 +9,7 @@ use shadow_fields::{bake, field::file, frame};
 
 #[test]
 fn other_programs_devices_and_inputs_are_refused_with_both_names() {
-    if !has_device() {
-        return;
-    }
-    let farm = Farm::new();
-    farm.plan();
+    let Some(farm) = Farm::planned() else { return };
     let good = farm.read("p.json");
     let refused = |edit: &dyn Fn(&mut Value)| {
         let mut plan = good.clone();
@@ -48,10 +44,7 @@ fn other_programs_devices_and_inputs_are_refused_with_both_names() {
 
 #[test]
 fn works_and_options_that_make_no_plan_are_refused_in_a_line() {
-    if !has_device() {
-        return;
-    }
-    let farm = Farm::new();
+    let Some(farm) = Farm::with_device() else { return };
     std::fs::create_dir(farm.path("other")).unwrap();
     std::fs::copy(farm.path("film.toml"), farm.path("other/film.toml")).unwrap();
     std::fs::write(farm.path("notes.txt"), "").unwrap();
@@ -79,10 +72,7 @@ fn works_and_options_that_make_no_plan_are_refused_in_a_line() {
 /// Meshes of equal content are baked once.
 #[test]
 fn equal_meshes_are_planned_once() {
-    if !has_device() {
-        return;
-    }
-    let farm = Farm::new();
+    let Some(farm) = Farm::with_device() else { return };
     std::fs::copy(farm.path("meshes/b.obj"), farm.path("meshes/c.obj")).unwrap();
     farm.good(&[&["farm", "plan", "meshes", "-o", "p.json"][..], &DRAFT].concat());
     let plan = farm.read("p.json");
@@ -94,10 +84,7 @@ fn equal_meshes_are_planned_once() {
 /// A plan replaces a plan, and nothing else unless it is told to; never an input.
 #[test]
 fn a_plan_replaces_no_other_file() {
-    if !has_device() {
-        return;
-    }
-    let farm = Farm::new();
+    let Some(farm) = Farm::with_device() else { return };
     std::fs::create_dir(farm.path("meshes/more")).unwrap();
     for _ in 0..2 {
         let ran = farm.run(&[&["farm", "plan", "meshes", "-o", "p.json"][..], &DRAFT].concat());

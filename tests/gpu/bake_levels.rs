@@ -1,9 +1,7 @@
 //! Levels of detail in captures: what a field of a large mesh is off by where fewer triangles are drawn, and how many
 //! are.
 
-use crate::common;
-use common::generate;
-use common::{Gpu, gpu};
+use crate::common::{Gpu, generate, gpu, relative_rms};
 use glam::Vec3;
 use shadow_fields::asset::Mesh;
 use shadow_fields::bake::silhouette::{SilhouetteOptions, bake_silhouette};
@@ -36,9 +34,7 @@ fn options(levels: bool) -> bake::Options {
 }
 
 fn off(found: &[f32], wanted: &[f32]) -> f64 {
-    let sum = |terms: &mut dyn Iterator<Item = f64>| terms.sum::<f64>();
-    let apart = sum(&mut found.iter().zip(wanted).map(|(a, b)| f64::from(a - b).powi(2)));
-    (apart / sum(&mut wanted.iter().map(|b| f64::from(*b).powi(2)))).sqrt()
+    relative_rms(found.iter().zip(wanted).map(|(found, wanted)| (f64::from(*found), f64::from(*wanted))))
 }
 
 fn field(gpu: &Gpu, mesh: &Mesh, levels: bool) -> (Vec<f32>, BakeReport, f64) {

@@ -1,7 +1,7 @@
 //! Light that bounces within a rigid group, against the closed form of a hollow sphere: of all that leaves one place of
 //! its inside, every other place receives the same.
 
-use super::common::generate;
+use super::common::{generate, relative_rms};
 use super::stage::{Stage, small, stage};
 use glam::Vec3;
 use shadow_fields::asset::{Mesh, embedded};
@@ -150,14 +150,8 @@ fn what_moves_and_what_rests_light_each_other() {
     for (bounces, found, most) in [(1, &one, 0.075), (8, &all, 0.09)] {
         let rays = RayCast { rays: 512, bounces, ..RayCast::default() }.run(&world, &vertices);
         let error = |found: &[Vec<[f32; 3]>]| {
-            let mut squares = [0.0; 2];
-            for (v, truth) in vertices.iter().zip(&rays) {
-                for (channel, truth) in truth.radiosity.into_iter().enumerate() {
-                    squares[0] += (f64::from(found[v.entity][v.index][channel]) - truth).powi(2);
-                    squares[1] += truth * truth;
-                }
-            }
-            (squares[0] / squares[1]).sqrt()
+            let found = vertices.iter().flat_map(|v| found[v.entity][v.index]).map(f64::from);
+            relative_rms(found.zip(rays.iter().flat_map(|truth| truth.radiosity)))
         };
         let [without, with] = [error(&direct), error(found)];
         assert!(with < most && without > 2.4 * with, "{bounces}: {with}, {without} without");

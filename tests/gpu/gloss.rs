@@ -1,6 +1,6 @@
 //! What glossy surfaces reflect, against closed forms and rays through pixels.
 
-use super::common::report;
+use super::common::{relative_rms, report};
 use super::stage::{Stage, stage};
 use glam::DVec3;
 use shadow_fields::bounce::Bounces;
@@ -50,9 +50,7 @@ fn by_rays(scene: &Scene, rays: u32) -> RayPicture {
 
 /// Relative RMS over the pixels where the scene shows a surface: its background is black.
 fn error(found: &[f32], wanted: &[f32]) -> f64 {
-    let square = |x: f32| f64::from(x) * f64::from(x);
-    let apart: f64 = found.iter().zip(wanted).map(|(a, b)| square(a - b)).sum();
-    (apart / wanted.iter().map(|x| square(*x)).sum::<f64>()).sqrt()
+    relative_rms(found.iter().zip(wanted).map(|(found, wanted)| (f64::from(*found), f64::from(*wanted))))
 }
 
 /// Under light that is the same from everywhere a white metal is as bright as the light, and one whose microfacets pass

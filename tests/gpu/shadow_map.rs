@@ -1,5 +1,6 @@
 //! The shadow-map rival against rays: without occluders, in full shadow, and how its error falls.
 
+use crate::common::relative_rms;
 use crate::stage;
 use shadow_fields::bench::shadow_map::{Filter, ShadowMaps, maps_apply};
 use shadow_fields::scene::Scene;
@@ -40,10 +41,7 @@ fn both(stage: &Stage, scene: &Scene, filter: Filter, map_px: u32) -> [Vec<[f64;
 
 /// Relative root mean square difference.
 fn error([found, truth]: &[Vec<[f64; 3]>; 2]) -> f64 {
-    let square = |of: &dyn Fn(usize, usize) -> f64| {
-        (0..truth.len()).flat_map(|i| (0..3).map(move |c| (i, c))).map(|(i, c)| of(i, c).powi(2)).sum::<f64>()
-    };
-    (square(&|i, c| found[i][c] - truth[i][c]) / square(&|i, c| truth[i][c])).sqrt()
+    relative_rms(found.iter().flatten().copied().zip(truth.iter().flatten().copied()))
 }
 
 #[test]

@@ -1,5 +1,6 @@
 //! Sheets against rays: grounds, walls and ceilings that are rectangles, and what moves past them.
 
+use crate::common::relative_rms;
 use crate::stage;
 use shadow_fields::bake::{self, Quality};
 use shadow_fields::frame;
@@ -28,8 +29,7 @@ fn truth(scene: &Scene, time_s: f64, entity: usize, every: usize, rays: u32) -> 
 fn error(stage: &Stage, frame: &mut frame::Frame, scene: &Scene, time_s: f64, entity: usize, every: usize) -> f64 {
     let light = stage.light(frame, &scene.at(time_s)).swap_remove(entity);
     let (chosen, truth) = truth(scene, time_s, entity, every, 1024);
-    let off: f64 = chosen.iter().zip(&truth).map(|(&v, truth)| (f64::from(light[v][0]) - truth).powi(2)).sum();
-    (off / truth.iter().map(|truth| truth * truth).sum::<f64>()).sqrt()
+    relative_rms(chosen.iter().zip(truth).map(|(&v, truth)| (f64::from(light[v][0]), truth)))
 }
 
 const WHITE: &str = "albedo = [1, 1, 1]";

@@ -1,8 +1,7 @@
 //! A real window on a virtual display: every control, resizing, minimising, a screenshot against `render`, a clean end.
 
 use crate::cli::{COARSE, SMALL, command, finish, good, has_device};
-use crate::display::Display;
-use crate::viewing::{OPTIONS, PATIENCE, SIZE, View, open};
+use crate::viewing::{OPTIONS, PATIENCE, SIZE, View, desk, open};
 use crate::xdnd::drop_file;
 use crate::{model, room};
 use std::path::{Path, PathBuf};
@@ -31,11 +30,7 @@ const KEYS: [(&str, &str); 17] = [
 
 #[test]
 fn a_window_does_what_its_controls_say() {
-    if !has_device() {
-        return;
-    }
-    let folder = tempfile::tempdir().unwrap();
-    let Some(display) = Display::open(folder.path()) else { return };
+    let Some((folder, display)) = desk() else { return };
     let mut view = open(&display, folder.path());
     let first = view.picture(SIZE);
     assert!(first.iter().any(|p| *p != first[0]), "the window is of one colour");
@@ -102,11 +97,7 @@ fn names(folder: &Path, ending: &str) -> Vec<PathBuf> {
 /// files are dropped on the window.
 #[test]
 fn a_gltf_file_moves_in_the_window_and_dropped_files_open() {
-    if !has_device() {
-        return;
-    }
-    let folder = tempfile::tempdir().unwrap();
-    let Some(display) = Display::open(folder.path()) else { return };
+    let Some((folder, display)) = desk() else { return };
     model::robot().write(folder.path(), "robot");
     good(folder.path(), &format!("render robot.glb -o robot_#.png --frames 3 --fps 2 {SMALL}"));
     let pictures = names(folder.path(), "png").into_iter().map(|file| std::fs::read(file).unwrap());
@@ -152,11 +143,7 @@ fn a_gltf_file_moves_in_the_window_and_dropped_files_open() {
 
 #[test]
 fn the_next_scene_is_baked_and_shown_and_closing_ends_a_bake() {
-    if !has_device() {
-        return;
-    }
-    let folder = tempfile::tempdir().unwrap();
-    let Some(display) = Display::open(folder.path()) else { return };
+    let Some((folder, display)) = desk() else { return };
     let mut view = open(&display, folder.path());
     view.key("z", "command NextScene");
     // In the middle of what may be its bake.

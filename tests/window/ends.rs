@@ -1,8 +1,7 @@
 //! A window at its limits: its display goes away, or another program destroys it.
 
-use crate::cli::has_device;
 use crate::display::Display;
-use crate::viewing::{SIZE, View, open};
+use crate::viewing::{SIZE, View, desk, open};
 use std::path::Path;
 
 /// A window whose first entity has lost or got its light, while the scene stands still or runs.
@@ -19,12 +18,8 @@ fn edited<'d>(display: &'d Display, folder: &Path, is_still: bool) -> View<'d> {
 /// Xlib would end the process: instead, edits are saved beside the scene, and one line says so.
 #[test]
 fn a_lost_display_saves_edits() {
-    if !has_device() {
-        return;
-    }
     for is_still in [true, false] {
-        let folder = tempfile::tempdir().unwrap();
-        let Some(display) = Display::open(folder.path()) else { return };
+        let Some((folder, display)) = desk() else { return };
         let view = edited(&display, folder.path(), is_still);
         display.end();
         let (code, heard) = view.end();
@@ -43,12 +38,8 @@ fn a_lost_display_saves_edits() {
 /// Another program destroys the window, by its close button or at random: the same holds.
 #[test]
 fn a_destroyed_window_saves_edits() {
-    if !has_device() {
-        return;
-    }
     for is_still in [true, false] {
-        let folder = tempfile::tempdir().unwrap();
-        let Some(display) = Display::open(folder.path()) else { return };
+        let Some((folder, display)) = desk() else { return };
         let view = edited(&display, folder.path(), is_still);
         display.xdotool(&["windowclose", &view.window]);
         let (code, heard) = view.end();
@@ -82,11 +73,7 @@ fn thread_heaps(view: &View<'_>) -> Vec<String> {
 /// Each arena would keep what its threads freed, for as long as the window is open.
 #[test]
 fn threads_have_no_memory_of_their_own() {
-    if !has_device() {
-        return;
-    }
-    let folder = tempfile::tempdir().unwrap();
-    let Some(display) = Display::open(folder.path()) else { return };
+    let Some((folder, display)) = desk() else { return };
     let mut view = open(&display, folder.path());
     view.key("g", "ToggleReference");
     view.picture(SIZE);

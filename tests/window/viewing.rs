@@ -1,6 +1,6 @@
 //! The program with its window on a virtual display.
 
-use super::cli::{COARSE, command};
+use super::cli::{COARSE, command, has_device};
 use super::common::Running;
 use super::display::Display;
 use super::room;
@@ -9,6 +9,7 @@ use std::path::Path;
 use std::process::Stdio;
 use std::sync::mpsc::{Receiver, channel};
 use std::time::{Duration, Instant};
+use tempfile::TempDir;
 
 pub const SIZE: [usize; 2] = [480, 320];
 /// How the lamp moves while the scene runs.
@@ -16,6 +17,16 @@ pub const MOTION: &str = "motion = [{ bob = { amplitude_m = 0.2, period_s = 3 } 
 /// The window's size, and samples as `render` takes them.
 pub const OPTIONS: &str = "--size 480x320 --no-overlay --antialias samples --validation sync";
 pub const PATIENCE: Duration = Duration::from_secs(60);
+
+/// A folder and a display; `None` where a device or the display is missing.
+pub fn desk() -> Option<(TempDir, Display)> {
+    if !has_device() {
+        return None;
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let display = Display::open(folder.path())?;
+    Some((folder, display))
+}
 
 /// The program with its window, and the lines that it logs.
 pub struct View<'d> {

@@ -2,7 +2,7 @@
 
 mod change;
 
-use crate::common::{Gpu, gpu};
+use crate::common::{Gpu, gpu, relative_rms};
 use shadow_fields::asset::embedded;
 use shadow_fields::check::sharp as check;
 use shadow_fields::draw::{Antialias, Shading};
@@ -24,15 +24,8 @@ fn error(gpu: &Gpu, scene: &Scene, options: frame::Options, rays: u32) -> f64 {
     let lit: Vec<Vec<[f32; 3]>> = (0..scene.entities.len())
         .map(|entity| if scene.entities[entity].receives { frame.radiosity(entity).unwrap() } else { Vec::new() })
         .collect();
-    let mut off = 0.0;
-    let mut whole = 0.0;
-    for (vertex, truth) in vertices.iter().zip(&truth) {
-        for (found, exact) in lit[vertex.entity][vertex.index].iter().zip(truth.radiosity) {
-            off += (f64::from(*found) - exact).powi(2);
-            whole += exact * exact;
-        }
-    }
-    (off / whole).sqrt()
+    let found = vertices.iter().flat_map(|vertex| lit[vertex.entity][vertex.index]).map(f64::from);
+    relative_rms(found.zip(truth.iter().flat_map(|truth| truth.radiosity)))
 }
 
 fn parse(text: &str) -> Scene {

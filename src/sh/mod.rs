@@ -1,6 +1,6 @@
 //! Spherical harmonics in f64: the maths that bakes, shaders and their tests use. It needs no Vulkan and no files.
 //!
-//! Conventions, tested in `tests/sh`:
+//! Conventions, tested in `tests/maths/sh`:
 //!
 //! - real orthonormal basis with the Condon-Shortley phase (reference 1): Y1,-1 = -0.488603 y, Y1,0 = 0.488603 z, Y1,1
 //!   = -0.488603 x; coefficient l (l + 1) + m; n bands are n^2 coefficients, 1 to [`MAX_BANDS`];

@@ -10,7 +10,6 @@ pub mod generate;
 
 use bytemuck::Pod;
 use glam::Vec3;
-use shadow_fields::asset::Mesh;
 use shadow_fields::bake::Baker;
 use shadow_fields::bake::cache::Cache;
 use shadow_fields::bake::capture::{Capture, Slots};
@@ -113,11 +112,6 @@ impl Gpu {
     pub fn atlas<T: Pod>(&self, capture: &Capture, eyes: &[Vec3], slots: &[Slots]) -> Vec<T> {
         check::capture::atlas(&self.device, capture, eyes, slots).unwrap()
     }
-}
-
-/// The teapot, cut more coarsely than the default: open, with handle and spout.
-pub fn pot(subdivisions: u32) -> Mesh {
-    generate::teapot(subdivisions)
 }
 
 /// A PNG that states 65 535 x 65 535 pixels and has none.

@@ -5,7 +5,8 @@
 
 use base64::Engine as _;
 use serde_json::{Value, json};
-use shadow_fields::scene::gltf;
+use shadow_fields::Result;
+use shadow_fields::scene::{Scene, gltf};
 use std::path::{Path, PathBuf};
 
 /// Component types of accessors.
@@ -192,9 +193,28 @@ impl Model {
 }
 
 /// Reads a model by way of a GLB file.
-pub fn load(model: &Model) -> gltf::Import {
+pub fn read(model: &Model, options: &gltf::Options) -> Result<gltf::Import> {
     let folder = tempfile::tempdir().unwrap();
-    gltf::load(&model.write(folder.path(), "m"), &gltf::Options::default()).unwrap_or_else(|error| panic!("{error}"))
+    gltf::load(&model.write(folder.path(), "m"), options)
+}
+
+/// The same of a good model.
+pub fn load(model: &Model) -> gltf::Import {
+    read(model, &gltf::Options::default()).unwrap_or_else(|error| panic!("{error}"))
+}
+
+/// The one line with exit code 4 by which a model is refused.
+pub fn refusal(read: Result<gltf::Import>) -> String {
+    let error = read.map(|_| ()).unwrap_err();
+    let line = error.to_string();
+    assert!(error.exit_code() == 4 && !line.contains('\n'), "{line}");
+    line
+}
+
+/// A model as a scene, and what is left out of it.
+pub fn scene(model: &Model) -> (Scene, gltf::Notes) {
+    let folder = tempfile::tempdir().unwrap();
+    Scene::load_with_notes(&model.write(folder.path(), "m"), &gltf::Options::default()).unwrap()
 }
 
 /// A floor, a stretched box on it that turns, a glowing ball-like box and a lamp.

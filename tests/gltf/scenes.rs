@@ -4,7 +4,7 @@ use crate::model;
 use glam::{DMat4, DQuat, DVec3, Vec3};
 use model::{F32, I8, I16, Model, U8, U16, U32, cuboid, load};
 use serde_json::json;
-use shadow_fields::scene::{Scene, Surroundings, gltf};
+use shadow_fields::scene::{Surroundings, gltf};
 use shadow_fields::truth::RayCast;
 use std::path::Path;
 
@@ -326,9 +326,7 @@ fn spots_shine_within_their_cone() {
     let outer = model.node(json!({ "scale": [2, 2, 2], "translation": [0, 1, 0] }));
     let extension = json!({ "KHR_lights_punctual": { "light": light } });
     model.child(outer, json!({ "translation": [0, 0.5, 0], "rotation": [-half, 0, 0, half], "extensions": extension }));
-    let folder = tempfile::tempdir().unwrap();
-    let (mut scene, notes) =
-        Scene::load_with_notes(&model.write(folder.path(), "m"), &gltf::Options::default()).unwrap();
+    let (mut scene, notes) = model::scene(&model);
     scene.surround(&Surroundings::None).unwrap();
     assert_eq!(notes.left_out(), [""; 0]);
     assert_eq!(scene.entities.len(), 2, "a floor and a lamp: {:?}", notes.said());
@@ -390,9 +388,7 @@ fn a_file_is_one_mesh_where_a_mesh_is_wanted() {
 
 #[test]
 fn scenes_load_by_their_ending() {
-    let folder = tempfile::tempdir().unwrap();
-    let (scene, notes) =
-        Scene::load_with_notes(&arrows().write(folder.path(), "A"), &gltf::Options::default()).unwrap();
+    let (scene, notes) = model::scene(&arrows());
     assert_eq!((scene.data.entities.len(), scene.data.meshes.len(), notes.left_out().len()), (4, 4, 0));
     // A scene without light gets a sky, whose sun stands behind the entities of the file.
     assert!(scene.entities[..4].iter().all(|entity| entity.occludes && entity.receives && !entity.emits));

@@ -49,8 +49,8 @@ fn textures_paint_surfaces() {
     // A quarter turn: what stands below stands at the right, green and white.
     let turn = json!({ "extensions": { "KHR_texture_transform": { "rotation": std::f32::consts::FRAC_PI_2 } } });
     square(&mut model, material([1.0; 4], turn), true);
-    let (scene, left_out) = scene_of(&model);
-    assert_eq!(left_out, [""; 0]);
+    let (scene, notes) = model::scene(&model);
+    assert_eq!(notes.left_out(), [""; 0]);
     let close = |a: Vec3, b: [f32; 3]| assert!((a - Vec3::from(b)).length() < 1e-3, "{a} for {b:?}");
     // What a place of the square's left and right halves shows, and the mean of what it shows.
     let shown = |i: usize, x: f32| {
@@ -69,14 +69,6 @@ fn textures_paint_surfaces() {
     close(shown(2, -1.0), [1.0, 0.0, 0.0]);
     close(shown(2, 1.0), [0.0, 1.0, 0.0]);
     close(scene.entities[3].albedo, [0.5, 1.0, 0.5]);
-}
-
-/// A model as a scene, and what is left out of it.
-fn scene_of(model: &Model) -> (Scene, Vec<String>) {
-    let folder = tempfile::tempdir().unwrap();
-    let path = model.write(folder.path(), "model");
-    let (scene, notes) = Scene::load_with_notes(&path, &Default::default()).unwrap();
-    (scene, notes.left_out())
 }
 
 /// A scene file that `import` writes names meshes and images of the glTF file, and reads as the same scene.
@@ -137,7 +129,7 @@ fn a_jpeg_texture_without_coordinates_becomes_its_mean() {
     square(&mut model, json!({ "pbrMetallicRoughness": { "baseColorTexture": { "index": texture } } }), false);
     let linear = |byte: u8| linear_from_srgb(f32::from(byte) / 255.0);
     let [left, right] = halves.map(|half| Vec3::from(half.map(linear)));
-    let found = scene_of(&model).0.entities[0].albedo;
+    let found = model::scene(&model).0.entities[0].albedo;
     let expected = (left + right) / 2.0;
     // A step of 8 bits is at most 0.009 in linear light at these colours, and JPEG at this quality is wrong by about
     // one.
@@ -240,7 +232,7 @@ fn colours_of_vertices_tint_a_surface() {
     model.json["accessors"][colors]["normalized"] = json!(true);
     let mesh = model.mesh(json!({ "POSITION": positions, "COLOR_0": colors }), None, None);
     model.node(json!({ "mesh": mesh }));
-    let (scene, _) = scene_of(&model);
+    let (scene, _) = model::scene(&model);
     assert!((scene.entities[0].albedo - Vec3::splat(0.25)).length() < 1e-6, "the mean by area");
     let tints = scene.meshes[0].tints.as_ref().unwrap();
     assert_eq!(*tints, [[Vec3::ZERO; 3], [Vec3::ONE; 3]].concat());
@@ -256,7 +248,7 @@ fn blended_and_transmissive_surfaces_let_light_through() {
     square(&mut model, json!({ "alphaMode": "OPAQUE", "pbrMetallicRoughness": color(0.25) }), false);
     let glass = json!({ "KHR_materials_transmission": { "transmissionFactor": 0.8 } });
     square(&mut model, json!({ "pbrMetallicRoughness": color(1.0), "extensions": glass }), false);
-    let (scene, _) = scene_of(&model);
+    let (scene, _) = model::scene(&model);
     for (entity, opacity, albedo) in [(0, 0.25, 0.125), (1, 1.0, 0.5), (2, 0.6, 0.1)] {
         let found = &scene.entities[entity];
         assert!((found.opacity - opacity).abs() < 1e-6 && (found.albedo.x - albedo).abs() < 1e-6, "{found:?}");

@@ -3,7 +3,7 @@
 
 use crate::common;
 use common::generate;
-use common::{Gpu, gpu, pot};
+use common::{Gpu, gpu};
 use glam::{Quat, Vec3};
 use shadow_fields::asset::Mesh;
 use shadow_fields::bake::capture::{Capture, Model, NO_SLOT, Way};
@@ -40,7 +40,7 @@ fn scenes() -> Vec<(Mesh, Vec<Vec3>)> {
     vec![
         (generate::sphere(0.5, 3), vec![Vec3::new(0.58, -0.58, 0.58) * 1.01]),
         (generate::torus(1.0, 0.3, 48, 24), hole),
-        (pot(4), vec![Vec3::new(0.0, 0.9, 0.0), Vec3::new(0.1, 0.0, 0.05)]),
+        (generate::teapot(4), vec![Vec3::new(0.0, 0.9, 0.0), Vec3::new(0.1, 0.0, 0.05)]),
         (generate::cuboid(Vec3::new(0.4, 1.0, 0.7), 2), vec![Vec3::new(0.33, 0.0, 0.1), Vec3::new(0.0, 0.82, 0.0)]),
         (tilted_plane(), vec![Vec3::new(0.01, 0.02, 0.01), Vec3::new(-0.1, 0.6, 0.1)]),
     ]

@@ -2,7 +2,7 @@
 
 use crate::common;
 use common::generate;
-use common::{gpu, pot, report};
+use common::{gpu, report};
 use glam::Vec3;
 use shadow_fields::asset::Mesh;
 use shadow_fields::bake::assemble::{Source, Sources, twin};
@@ -13,7 +13,7 @@ use shadow_fields::field::{FieldKind, Lattice};
 use std::f64::consts::PI;
 
 fn painted_pot() -> Mesh {
-    let pot = pot(3);
+    let pot = generate::teapot(3);
     let colors = pot.normals.iter().map(|n| (*n + Vec3::ONE) * Vec3::new(0.5, 1.0, 3.0)).collect();
     Mesh::new("painted pot", pot.positions, pot.normals, Some(colors), pot.triangles).unwrap()
 }
@@ -22,7 +22,7 @@ fn painted_pot() -> Mesh {
 #[test]
 fn projections_are_those_of_the_twin() {
     let Some(gpu) = gpu() else { return };
-    let pot = pot(3);
+    let pot = generate::teapot(3);
     let painted = painted_pot();
     let closed = generate::cuboid(Vec3::ONE, 1);
     let baker = gpu.baker();

@@ -1,7 +1,7 @@
 //! Silhouette fields: the pass against its twin, a ball against the overlap of two discs, and whole meshes against
 //! rays.
 
-use crate::common::{Gpu, generate, gpu, pot};
+use crate::common::{Gpu, generate, gpu};
 use glam::{DVec3, Vec3};
 use shadow_fields::asset::Mesh;
 use shadow_fields::bake::silhouette::{SilhouetteOptions, bake_silhouette};
@@ -32,7 +32,7 @@ fn blocked_light(field: &SilhouetteField, point: DVec3, normal: DVec3, light: &S
 #[test]
 fn maps_are_those_of_the_twin() {
     let Some(gpu) = gpu() else { return };
-    for mesh in [generate::torus(1.0, 0.3, 24, 12), pot(2), generate::sphere(0.5, 2)] {
+    for mesh in [generate::torus(1.0, 0.3, 24, 12), generate::teapot(2), generate::sphere(0.5, 2)] {
         let apart = check::compare(&gpu.baker(), &mesh).unwrap();
         assert!(apart.passes(), "{}: {apart:?}", mesh.name);
     }
@@ -97,7 +97,7 @@ fn blocked_by_rays(shape: &RayMesh, point: DVec3, toward: DVec3, angle: f64) -> 
 fn shadows_on_a_floor_are_those_of_rays() {
     const ACROSS: usize = 48;
     let Some(gpu) = gpu() else { return };
-    for mesh in [pot(4), generate::torus(1.0, 0.3, 48, 24)] {
+    for mesh in [generate::teapot(4), generate::torus(1.0, 0.3, 48, 24)] {
         let field = bake(&gpu, &mesh, SilhouetteOptions::default());
         let shape = RayMesh::new(&mesh);
         let (centre, radius_m) = mesh.bounding_sphere();
@@ -167,7 +167,7 @@ fn receivers_and_lights_within_the_bounding_sphere_see_what_lies_between_them() 
     // Limits on the root mean square error of a light's blocked share: receivers within, lights within.
     for (mesh, limits) in [
         (generate::torus(0.7, 0.25, 48, 24), [0.045, 0.06]),
-        (pot(3), [0.03, 0.04]),
+        (generate::teapot(3), [0.03, 0.04]),
         (table(), [0.085, 0.1]),
         (generate::cuboid(Vec3::new(2.0, 0.01, 2.0), 4), [0.06, 0.085]),
         (generate::cuboid(Vec3::new(0.5, 1.0, 0.8), 4), [0.03, 0.1]),
@@ -231,7 +231,7 @@ fn what_lies_behind_the_receiver_or_the_light_blocks_nothing() {
 #[test]
 fn a_file_keeps_everything_and_its_header_is_not_believed() {
     let Some(gpu) = gpu() else { return };
-    let field = bake(&gpu, &pot(2), SilhouetteOptions { cells: 2, map_px: 8, view_px: 32, levels: false });
+    let field = bake(&gpu, &generate::teapot(2), SilhouetteOptions { cells: 2, map_px: 8, view_px: 32, levels: false });
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("pot.sf");
     field.write(&path).unwrap();

@@ -3,6 +3,7 @@
 
 use crate::stage;
 use glam::{Quat, Vec3};
+use shadow_fields::asset::Mesh;
 use shadow_fields::check::merge::{ARITHMETIC, against_twin};
 use shadow_fields::frame;
 use shadow_fields::lists::skip::{Skip, SkipKind, TABLE};
@@ -140,11 +141,13 @@ fn a_light_that_faces_away_is_left_off() {
          [[entity]]\nmesh = \"floor\"\n[[entity]]\nmesh = \"floor\"\nposition = [0, 4, 0]\nrotation = { axis = [1, 0, 0], angle_deg = 180 }\n\
          [[entity]]\nmesh = \"lamp\"\nposition = [0, 2, 0]\nemission = [3, 2, 1]\n",
     );
-    let lamp = &scene.meshes[1];
-    let colors = lamp.normals.iter().map(|n| if n.y > 0.5 { Vec3::ONE } else { Vec3::ZERO }).collect();
-    let (positions, normals, triangles) = (lamp.positions.clone(), lamp.normals.clone(), lamp.triangles.clone());
-    let lamp = shadow_fields::asset::Mesh::new("lamp", positions, normals, Some(colors), triangles).unwrap();
-    scene.meshes[1] = lamp.into();
+    let lamp = scene.meshes[1].clone();
+    let painted = |color: fn(&Vec3) -> Vec3| {
+        let colors = lamp.normals.iter().map(color).collect();
+        let (positions, normals) = (lamp.positions.clone(), lamp.normals.clone());
+        Mesh::new("lamp", positions, normals, Some(colors), lamp.triangles.clone()).unwrap().into()
+    };
+    scene.meshes[1] = painted(|normal| if normal.y > 0.5 { Vec3::ONE } else { Vec3::ZERO });
     let placements = scene.at(0.0);
     // Fine directions: a cell more to either side counts as lit.
     let bake = shadow_fields::bake::Options { lattice: "cube:6x11".parse().unwrap(), ..small().bake };
@@ -159,11 +162,7 @@ fn a_light_that_faces_away_is_left_off() {
     let counts = with.counts(&placements);
     assert!(counts.facing_away > 0, "{counts:?}");
     // Black altogether, it is no light.
-    let black = vec![Vec3::ZERO; scene.meshes[1].positions.len()];
-    let lamp = &scene.meshes[1];
-    let (positions, normals, triangles) = (lamp.positions.clone(), lamp.normals.clone(), lamp.triangles.clone());
-    scene.meshes[1] =
-        shadow_fields::asset::Mesh::new("lamp", positions, normals, Some(black), triangles).unwrap().into();
+    scene.meshes[1] = painted(|_| Vec3::ZERO);
     let mut with = stage.frame(&scene, options);
     let light = stage.light(&mut with, &placements);
     assert!(light.iter().flatten().flatten().all(|c| *c == 0.0) && with.merged().merged_entries == 0);

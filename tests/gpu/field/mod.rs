@@ -3,7 +3,7 @@
 mod cache;
 mod transfer;
 
-use crate::common::{self, Gpu, generate, gpu, library};
+use crate::common::{Gpu, generate, gpu, library};
 use fastrand::Rng;
 use glam::{DVec3, Vec3};
 use half::f16;
@@ -182,7 +182,7 @@ fn samples_in_the_tube_are_filled_from_outside() {
 fn one_colour_shines_where_it_blocks() {
     let Some(gpu) = gpu() else { return };
     let color = Vec3::new(0.5, 2.0, 7.0);
-    for mesh in [torus(), common::pot(2)] {
+    for mesh in [torus(), generate::teapot(2)] {
         let colors = Some(vec![color; mesh.positions.len()]);
         let name = mesh.name.clone();
         let triangles = mesh.triangles.clone();

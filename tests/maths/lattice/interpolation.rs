@@ -1,7 +1,7 @@
 //! Which samples a lookup takes, and by what weights.
 
 use super::{ROUNDING, interpolate, lattices, noise, store};
-use crate::generate;
+use crate::common::generate;
 use fastrand::Rng;
 use glam::DVec3;
 use shadow_fields::bake;

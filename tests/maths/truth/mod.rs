@@ -1,9 +1,8 @@
 //! Ray casting and the exact chain against closed forms, and against each other.
 
-#[path = "../common/generate.rs"]
-mod generate;
 mod order;
 
+use crate::common::generate;
 use glam::{DVec3, Vec3};
 use shadow_fields::lists::skip::Skip;
 use shadow_fields::scene::Scene;

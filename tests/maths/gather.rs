@@ -1,9 +1,6 @@
 //! Cluster lists: those made through a tree are those of a look at everything, in their order, and everything that is
 //! left off has a reason.
 
-mod common;
-
-use common::report;
 use glam::{DQuat, DVec3};
 use shadow_fields::layout::{DeviceEntity, ENTRY_ENTITIES, ListEntry};
 use shadow_fields::lists::gather::{self, Candidates, ClusterBounds, EntityBounds, GROUP_CLUSTERS, SceneBounds};
@@ -127,7 +124,6 @@ fn the_tree_leaves_every_list_as_it_is() {
             }
         }
     }
-    report(&format!("{listed} entries; the tree offers {offered} of {all} occluders to groups"));
     // A group is searched once for all chains, under the brightest light, so that each occluder counts once.
     assert!(listed > 10_000 && 10 * offered < 7 * all, "the tree is of use: {offered} of {all}");
 }

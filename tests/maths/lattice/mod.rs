@@ -1,9 +1,8 @@
 //! The lattice: sample points, weights, continuity, fall-off, text form. Seeds are fixed; "exactly" means f64 rounding.
 
-#[path = "../common/generate.rs"]
-mod generate;
 mod interpolation;
 
+use crate::common::generate;
 use fastrand::Rng;
 use glam::DVec3;
 use shadow_fields::bake;

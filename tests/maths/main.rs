@@ -1,0 +1,8 @@
+//! Mathematics on the processor: spherical harmonics, lattices, lists of clusters, rays.
+
+#[path = "../common/mod.rs"]
+mod common;
+mod gather;
+mod lattice;
+mod sh;
+mod truth;

@@ -82,29 +82,40 @@ impl Lattice {
         (first * columns + at(down)) * columns + at(right)
     }
 
-    /// The direction of a node of a face, or of a node one step beyond the face's edge.
-    fn node(&self, face: u32, x: i64, y: i64) -> u32 {
+    /// Face coordinate of the i-th captured direction along a row.
+    fn st(&self, i: u32) -> f64 {
+        let columns = self.columns();
+        if self.has_edges() {
+            node_st(i, columns)
+        } else {
+            unwarp((f64::from(i) + 0.5) / f64::from(columns) * 2.0 - 1.0)
+        }
+    }
+
+    /// The captured direction at a place of a face, or at a place one step beyond one of the face's edges.
+    fn captured(&self, face: u32, x: i64, y: i64) -> u32 {
         let columns = self.columns();
         let last = i64::from(columns) - 1;
         let within = |i: i64| (0..=last).contains(&i);
         if within(x) && within(y) {
             return self.first_of((face * columns + y as u32) * columns + x as u32);
         }
-        // Projection of a point just beyond the edge, and not at its ends, finds the neighbouring face. The node lies
-        // one step from that face's edge.
-        let hair = 1e-6;
-        let off_end = 1e-3;
+        // Projection of a point just beyond the edge finds the neighbouring face. At an edge's end there would be two.
         let st = |i: i64| match i {
-            -1 => -1.0 - hair,
-            0 => -1.0 + off_end,
-            i if i == last => 1.0 - off_end,
-            i if i > last => 1.0 + hair,
-            i => node_st(i as u32, columns),
+            -1 => -1.0 - 1e-6,
+            i if i > last => 1.0 + 1e-6,
+            i => self.st(i as u32).clamp(-0.999, 0.999),
         };
         let (other, s, t) = cube::face_st(cube::direction(face as usize, st(x), st(y)));
-        let along = |s: f64| node_at(s, columns).round() as u32;
-        let step = |s: f64| if s < 0.0 { 1 } else { columns - 2 };
-        let (x, y) = if s.abs() > t.abs() { (step(s), along(t)) } else { (along(s), step(t)) };
+        let (x, y) = if self.has_edges() {
+            // One step from the edge, which both faces have.
+            let along = |s: f64| node_at(s, columns).round() as u32;
+            let step = |s: f64| if s < 0.0 { 1 } else { columns - 2 };
+            if s.abs() > t.abs() { (step(s), along(t)) } else { (along(s), step(t)) }
+        } else {
+            let cell = |s: f64| (((warp(s) + 1.0) / 2.0 * f64::from(columns)).floor() as u32).min(columns - 1);
+            (cell(s), cell(t))
+        };
         self.first_of((other as u32 * columns + y) * columns + x)
     }
 
@@ -117,12 +128,8 @@ impl Lattice {
     pub fn direction(&self, index: u32) -> DVec3 {
         let columns = self.columns();
         let index = self.first_of(index);
-        let st = |i: u32| match self.has_edges() {
-            true => node_st(i, columns),
-            false => unwarp((f64::from(i) + 0.5) / f64::from(columns) * 2.0 - 1.0),
-        };
         let face = (index / (columns * columns)) as usize;
-        cube::direction(face, st(index % columns), st(index / columns % columns))
+        cube::direction(face, self.st(index % columns), self.st(index / columns % columns))
     }
 
     /// For every stored direction, the captured directions of which it is the mean: one, but on an edge between cells
@@ -138,14 +145,13 @@ impl Lattice {
                 for x in -1..=n {
                     let inside_x = x.clamp(0, n - 1);
                     let inside_y = y.clamp(0, n - 1);
+                    let nearest = self.captured(face, inside_x, inside_y);
                     out.push(match (x == inside_x, y == inside_y) {
-                        (true, true) => vec![self.cell_index(face, x, y)],
-                        (false, false) => vec![
-                            self.cell_index(face, inside_x, inside_y),
-                            self.neighbour(face, x, inside_y),
-                            self.neighbour(face, inside_x, y),
-                        ],
-                        _ => vec![self.cell_index(face, inside_x, inside_y), self.neighbour(face, x, y)],
+                        (true, true) => vec![nearest],
+                        (false, false) => {
+                            vec![nearest, self.captured(face, x, inside_y), self.captured(face, inside_x, y)]
+                        }
+                        _ => vec![nearest, self.captured(face, x, y)],
                     });
                 }
             }
@@ -157,40 +163,10 @@ impl Lattice {
     /// meet there are only three, and the one on the third edge is opposite to both others.
     pub fn cell_neighbours(&self, direction: u32) -> Vec<u32> {
         let columns = self.columns();
-        let n = i64::from(self.columns());
         let face = direction / (columns * columns);
-        let x = direction % columns;
-        let y = direction / columns % columns;
-        let x = i64::from(x);
-        let y = i64::from(y);
-        if self.has_edges() {
-            return [(x - 1, y), (x + 1, y), (x, y - 1), (x, y + 1)].map(|(x, y)| self.node(face, x, y)).to_vec();
-        }
-        [(x - 1, y), (x + 1, y), (x, y - 1), (x, y + 1)]
-            .map(|(x, y)| {
-                let within = (0..n).contains(&x) && (0..n).contains(&y);
-                if within { self.cell_index(face, x, y) } else { self.neighbour(face, x, y) }
-            })
-            .to_vec()
-    }
-
-    fn cell_index(&self, face: u32, x: i64, y: i64) -> u32 {
-        (face * self.cells + y as u32) * self.cells + x as u32
-    }
-
-    /// The captured direction that lies one cell beyond the edge of `face`, where exactly one of x and y is outside.
-    fn neighbour(&self, face: u32, x: i64, y: i64) -> u32 {
-        let cells = self.cells;
-        let n = i64::from(cells);
-        // Projection of a point just beyond the edge finds the other face's cell.
-        let st = |i: i64| match i {
-            -1 => -1.0 - 1e-6,
-            i if i == n => 1.0 + 1e-6,
-            i => unwarp((i as f64 + 0.5) / f64::from(cells) * 2.0 - 1.0),
-        };
-        let (other, s, t) = cube::face_st(cube::direction(face as usize, st(x), st(y)));
-        let cell = |s: f64| (((warp(s) + 1.0) / 2.0 * f64::from(cells)).floor() as i64).clamp(0, n - 1);
-        self.cell_index(other as u32, cell(s), cell(t))
+        let x = i64::from(direction % columns);
+        let y = i64::from(direction / columns % columns);
+        [(x - 1, y), (x + 1, y), (x, y - 1), (x, y + 1)].map(|(x, y)| self.captured(face, x, y)).to_vec()
     }
 
     /// The face that a direction meets, and its place among the face's stored samples: 0 to cells + 1.

@@ -6,7 +6,7 @@
 //! Stretching each axis by the square root of longest edge over edge halves the box's proportions (in logarithms) and
 //! costs a lookup three multiply-adds.
 
-use glam::{DMat3, DVec3, Vec3};
+use glam::{DVec3, Vec3};
 use serde::{Deserialize, Serialize};
 
 /// Maps a point p (object's frame, in r from the bounding sphere's centre) to (p - centre) * stretch in the lattice's
@@ -59,22 +59,9 @@ impl Fit {
         q / DVec3::from(self.stretch) + DVec3::from(self.centre)
     }
 
-    /// Largest factor: no angle grows by more from the lattice's space to the object's frame.
-    pub fn largest(&self) -> f64 {
-        self.stretch.into_iter().fold(1.0, f64::max)
-    }
-
     /// Whether the numbers have the range and steps that [`Fit::new`] produces.
     pub fn is_usable(&self) -> bool {
         self.centre.iter().all(|c| c.abs() <= 1.0) && self.stretch.iter().all(|s| (1.0..=Fit::MOST).contains(s))
-    }
-
-    /// Whether a turn or mirror about the bounding sphere's centre leaves the lattice's space as it is.
-    pub fn keeps(&self, matrix: DMat3) -> bool {
-        let centre = DVec3::from(self.centre);
-        let stretch = DMat3::from_diagonal(DVec3::from(self.stretch));
-        let same = |a: DMat3, b: DMat3| (a - b).to_cols_array().iter().all(|x| x.abs() < 1e-9);
-        (matrix * centre - centre).length() < 1e-9 && same(matrix * stretch, stretch * matrix)
     }
 
     /// For a shader: x, y, z are added after stretching; w holds the three factors, in 64ths above 1, as one whole
@@ -101,17 +88,6 @@ mod tests {
             assert_eq!(Fit::new(&cuboid(Vec3::ZERO, half)), Fit::ROUND, "{half}");
         }
         assert_eq!(Fit::new(&[]), Fit::ROUND);
-    }
-
-    #[test]
-    fn turns_and_mirrors_that_keep_it() {
-        let flat = Fit { centre: [0.0, 0.25, 0.0], stretch: [1.0, 1.5, 1.0] };
-        let about = |axis: DVec3, angle: f64| DMat3::from_axis_angle(axis, angle);
-        assert!(flat.keeps(about(DVec3::Y, 0.3)) && flat.keeps(DMat3::from_diagonal(DVec3::new(-1.0, 1.0, 1.0))));
-        assert!(!flat.keeps(DMat3::from_diagonal(DVec3::new(1.0, -1.0, 1.0))), "the centre moves");
-        let low = Fit { centre: [0.0; 3], ..flat };
-        assert!(low.keeps(DMat3::from_diagonal(DVec3::new(1.0, -1.0, 1.0))) && !low.keeps(about(DVec3::X, 0.3)));
-        assert!(Fit::ROUND.keeps(about(DVec3::X, 0.3)));
     }
 
     #[test]

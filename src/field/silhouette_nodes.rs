@@ -13,8 +13,6 @@ pub struct NodeGrid {
     /// Map and whether the node is the opposite of the map's direction, by face, row and column.
     nodes: Vec<(usize, bool)>,
     directions: Vec<DVec3>,
-    /// Map of a node and whether it is the opposite of the map's direction, by its rounded direction.
-    known: HashMap<IVec3, (usize, bool)>,
 }
 
 /// Shared nodes come out of several faces with different last digits.
@@ -56,7 +54,8 @@ impl NodeGrid {
         let columns = cells + 1;
         let mut nodes = Vec::with_capacity(FACE_COUNT * (columns * columns) as usize);
         let mut directions = Vec::with_capacity(Self::map_count(cells));
-        let mut known = HashMap::new();
+        // Map of a node and whether it is the opposite of the map's direction.
+        let mut known: HashMap<IVec3, (usize, bool)> = HashMap::new();
         for face in 0..FACE_COUNT {
             for (y, x) in (0..columns).flat_map(|y| (0..columns).map(move |x| (y, x))) {
                 let st = |i: u32| unwarp(2.0 * f64::from(i) / f64::from(cells) - 1.0);
@@ -72,16 +71,11 @@ impl NodeGrid {
             }
         }
         assert_eq!(directions.len(), Self::map_count(cells), "maps of a grid of {cells} cells");
-        NodeGrid { cells, nodes, directions, known }
+        NodeGrid { cells, nodes, directions }
     }
 
     pub fn map_direction(&self, map: usize) -> DVec3 {
         self.directions[map]
-    }
-
-    /// Map and mirroring of the node in a unit direction, if one is there.
-    pub fn node_at(&self, direction: DVec3) -> Option<(usize, bool)> {
-        self.known.get(&rounded(direction)).copied()
     }
 
     /// Map and mirroring of every node, by face, row and column.

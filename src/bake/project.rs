@@ -10,8 +10,9 @@ use crate::error::{Error, Result};
 use crate::field::quantity::{FieldKind, channel_stride};
 use crate::gpu::memory::TexelView;
 use crate::gpu::{Bind, Buffer, BufferKind, Commands, ComputePipeline, Device, Image};
-use crate::sh::basis::{MAX_COEFFICIENTS, coefficient_count, evaluate};
-use crate::sh::cube::{FACE_COUNT, direction, solid_angle, texel_st};
+use crate::sh;
+use crate::sh::basis::coefficient_count;
+use crate::sh::cube::{solid_angle, texel_st};
 use crate::shaders::{Library, ShaderPermutation};
 use ash::vk;
 use bytemuck::{Pod, Zeroable};
@@ -143,28 +144,15 @@ pub fn twin(
     scale: f32,
     texel: impl Fn(usize, usize, usize) -> [f32; 3],
 ) -> Vec<f64> {
-    let stride = channel_stride(bands);
-    let mut out = vec![0.0; kind.channels() * stride];
-    let weights = solid_angle(face_px);
-    for face in 0..FACE_COUNT {
-        for (i, weight) in weights.iter().enumerate() {
-            let x = i % face_px;
-            let y = i / face_px;
-            let w = direction(face, texel_st(x, face_px), texel_st(y, face_px));
-            let mut basis = [0.0; MAX_COEFFICIENTS];
-            evaluate(bands, w, &mut basis);
-            let captured = texel(face, x, y).map(f64::from);
-            let values = match kind {
-                FieldKind::Radiance => captured,
-                FieldKind::Occlusion => [f64::from(captured[0] < 1.0), 0.0, 0.0],
-            };
-            for (channel, value) in values.iter().enumerate().take(kind.channels()) {
-                for (k, y) in basis.iter().enumerate().take(coefficient_count(bands)) {
-                    out[channel * stride + k] += weight * value * y;
-                }
-            }
-        }
-    }
-    out.iter_mut().for_each(|c| *c *= f64::from(scale));
-    out
+    let channel = |channel: usize| {
+        let value = |face, x, y| match kind {
+            FieldKind::Radiance => f64::from(texel(face, x, y)[channel]),
+            FieldKind::Occlusion => f64::from(texel(face, x, y)[0] < 1.0),
+        };
+        let mut coefficients = sh::project(bands, face_px, value);
+        coefficients.iter_mut().for_each(|c| *c *= f64::from(scale));
+        coefficients.resize(channel_stride(bands), 0.0);
+        coefficients
+    };
+    (0..kind.channels()).flat_map(channel).collect()
 }

@@ -91,15 +91,9 @@ impl SceneNeeds {
 
     /// Whether everything is in the cache, so that [`ensure()`] bakes nothing.
     pub fn are_cached(&self, scene: &Scene, cache: &Cache) -> bool {
-        let mut meshes = self.meshes.iter().enumerate().map(|(index, needs)| (scene.caster(index), needs));
-        meshes.all(|(mesh, (needed, headers))| {
-            headers.iter().flatten().all(|header| cache.has_field(header))
-                && (!needed.silhouette || cache.has_silhouette(mesh, &self.options))
-        }) && self.surfaces.groups.iter().all(|group| cache.has_surfaces(group))
+        self.missing(scene, cache).is_empty()
     }
-}
 
-impl SceneNeeds {
     /// The bakes that [`ensure()`] will not find in the cache, in its order: the name that progress is told by, and the
     /// number of captures.
     pub fn missing(&self, scene: &Scene, cache: &Cache) -> Vec<(String, u32)> {

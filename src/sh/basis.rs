@@ -14,7 +14,6 @@
 //! [`crate::sh`]). The factor (-1)^m is the Condon-Shortley phase.
 
 use std::f64::consts::PI;
-use std::fmt::Write;
 use std::sync::LazyLock;
 
 use glam::DVec3;
@@ -177,10 +176,7 @@ fn horner(program: &mut Program, coefficients: &[f64], z: Value, z_squared: Opti
 
 /// GLSL 460 text of `void sh_basis(vec3 d, out float y[N])`, N = bands^2: [`evaluate`] as straight-line f32 code.
 pub fn glsl_basis(bands: usize) -> String {
-    let mut text = String::new();
     let count = coefficient_count(bands);
     let body = basis_program(bands).glsl_body();
-    write!(text, "void sh_basis(vec3 d, out float y[{count}]) {{\n{body}}}\n")
-        .expect("writing to a String cannot fail");
-    text
+    format!("void sh_basis(vec3 d, out float y[{count}]) {{\n{body}}}\n")
 }

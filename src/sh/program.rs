@@ -27,10 +27,6 @@ impl Term {
     pub fn new(coefficient: f64, factors: &[Value]) -> Self {
         Self { coefficient, factors: factors.to_vec() }
     }
-
-    fn multiply_count(&self) -> usize {
-        (self.factors.len() + usize::from(self.coefficient.abs() != 1.0)).saturating_sub(1)
-    }
 }
 
 /// `variable = terms` or `variable += terms`.
@@ -39,17 +35,6 @@ struct Instruction {
     target: usize,
     accumulate: bool,
     terms: Vec<Term>,
-}
-
-/// Operation counts of a program.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct OperationCount {
-    /// Multiplications.
-    pub multiply_count: usize,
-    /// Additions and subtractions.
-    pub add_count: usize,
-    /// Instructions on hardware that fuses `x * y + z` into one.
-    pub fma_count: usize,
 }
 
 /// A list of instructions without branches or loops.
@@ -107,20 +92,6 @@ impl Program {
         for (output, (_, value)) in outputs.iter_mut().zip(&self.outputs) {
             *output = read(&variables, *value);
         }
-    }
-
-    /// Operation counts; `fma_count` assumes that the compiler contracts every `x * y + z` of the text.
-    pub fn cost(&self) -> OperationCount {
-        let mut cost = OperationCount::default();
-        for Instruction { accumulate, terms, .. } in &self.instructions {
-            let multiplies: usize = terms.iter().map(Term::multiply_count).sum();
-            let adds = terms.len() - usize::from(!accumulate);
-            let fusible = terms.iter().filter(|term| term.multiply_count() > 0).count();
-            cost.multiply_count += multiplies;
-            cost.add_count += adds;
-            cost.fma_count += multiplies + adds - adds.min(fusible);
-        }
-        cost
     }
 
     /// The body of a GLSL function, one statement per line, indented by four spaces.

@@ -75,11 +75,6 @@ impl Rotation {
         Self { bands, blocks }
     }
 
-    /// Bands of the expansions that this turns.
-    pub fn bands(&self) -> usize {
-        self.bands
-    }
-
     /// The row-major blocks of bands 1, 2, ... in this order: [`block_count`] numbers.
     pub fn blocks(&self) -> &[f64] {
         &self.blocks
@@ -162,7 +157,7 @@ fn turn_about_z(program: &mut Program, bands: usize, [cosine, sine]: [Value; 2],
 /// Appends a constant rotation; elements that are 0 in exact arithmetic are left out.
 fn turn_fixed(program: &mut Program, rotation: &Rotation, values: &mut [Value]) {
     let mut rest = rotation.blocks();
-    for l in 1..rotation.bands() {
+    for l in 1..rotation.bands {
         let (block, after) = rest.split_at((2 * l + 1) * (2 * l + 1));
         let band = l * l..(l + 1) * (l + 1);
         let before = values[band.clone()].to_vec();

@@ -148,7 +148,7 @@ pub fn made_up(
             }
         }
     }
-    let case = format!("{} x {}", workload.vertex_count(), workload.occluder_count());
+    let case = format!("{} x {}", workload.vertex_count, workload.occluder_count);
     let rows = ready.into_iter().map(|(variant, permutation, census, _, _, times)| {
         (row(&case, variant.name, workload.pairs(), &times, &permutation, &census, at_best), times)
     });

@@ -19,8 +19,10 @@ const BANDS: usize = 4;
 
 /// The buffers of a made-up merge.
 pub struct Workload {
-    vertex_count: u32,
-    occluder_count: u32,
+    /// Vertices that are lit.
+    pub vertex_count: u32,
+    /// Occluders that each of them meets.
+    pub occluder_count: u32,
     lattice: Lattice,
     entity_limit: u32,
     entities: Buffer,
@@ -106,16 +108,6 @@ impl Workload {
             sky: Buffer::with_data(device, "workload sky", &[1.0_f32; 3 * BANDS * BANDS])?,
             radiosity: Buffer::new(device, "workload radiosity", BufferKind::Device, 16 * u64::from(vertex_count))?,
         })
-    }
-
-    /// Vertices that are lit.
-    pub fn vertex_count(&self) -> u32 {
-        self.vertex_count
-    }
-
-    /// Occluders that each of them meets.
-    pub fn occluder_count(&self) -> u32 {
-        self.occluder_count
     }
 
     /// Pairs of vertex and occluder in one merge.

@@ -197,14 +197,18 @@ pub enum LightKind {
     Sheet,
 }
 
-/// The GLSL text of the structs that light is computed from.
-pub fn glsl_structs() -> String {
-    glsl_struct("Entity", DeviceEntity::FIELDS) + &glsl_struct("Cluster", Cluster::FIELDS)
-}
-
-/// The GLSL text of [`GlossEntity`].
-pub fn glsl_gloss_struct() -> String {
-    glsl_struct("GlossEntity", GlossEntity::FIELDS)
+/// The text of a generated include that declares or reads shared structs.
+pub fn glsl(file: &str) -> Option<String> {
+    Some(match file {
+        "structs.glsl" => glsl_struct("Entity", DeviceEntity::FIELDS) + &glsl_struct("Cluster", Cluster::FIELDS),
+        "gloss_structs.glsl" => glsl_struct("GlossEntity", GlossEntity::FIELDS),
+        "entity_at.glsl" => glsl_reader("Entity entity_at", "entities", "vec4", DeviceEntity::FIELDS),
+        "cluster_at.glsl" => glsl_reader("Cluster cluster_at", "clusters", "uvec2", Cluster::FIELDS),
+        "gloss_entity_at.glsl" => {
+            glsl_reader("GlossEntity gloss_entity_at", "gloss_entities", "vec4", GlossEntity::FIELDS)
+        }
+        _ => return None,
+    })
 }
 
 fn glsl_struct(name: &str, fields: &[SharedField]) -> String {
@@ -212,22 +216,8 @@ fn glsl_struct(name: &str, fields: &[SharedField]) -> String {
     format!("struct {name} {{\n{fields}}};\n")
 }
 
-/// `gloss_entity_at(i)`, which reads [`GlossEntity`] from the texel view `gloss_entities`, four words a texel.
-pub fn glsl_gloss_entity_at() -> String {
-    glsl_reader("GlossEntity gloss_entity_at", "gloss_entities", "vec4", GlossEntity::FIELDS)
-}
-
-/// `entity_at(i)`, which reads an entity from the texel view `entities`, four floats a texel.
-pub fn glsl_entity_at() -> String {
-    glsl_reader("Entity entity_at", "entities", "vec4", DeviceEntity::FIELDS)
-}
-
-/// `cluster_at(i)`, which reads a cluster from the texel view `clusters`, of [`CLUSTER_FORMAT`].
-pub fn glsl_cluster_at() -> String {
-    glsl_reader("Cluster cluster_at", "clusters", "uvec2", Cluster::FIELDS)
-}
-
-/// A function that puts a struct together from its texels. No field lies in two of them.
+/// A function `NAME(i)` that puts a struct together from the texels of a view, of two or four words each: one of
+/// [`CLUSTER_FORMAT`] has two. No field lies in two texels.
 fn glsl_reader(function: &str, view: &str, texel: &str, fields: &[SharedField]) -> String {
     let texel_words = if texel == "uvec2" { 2 } else { 4 };
     let end_bytes = fields.last().map_or(0, |field| field.offset_bytes + field.size_bytes);

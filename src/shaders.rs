@@ -214,18 +214,13 @@ fn generate(name: &str, row: &ShaderPermutation) -> Option<String> {
     let field_bands = row.field_bands;
     match name {
         "basis.glsl" => Some(sh::basis::glsl_basis(bands)),
-        "cluster_at.glsl" => Some(layout::glsl_cluster_at()),
         "cosine.glsl" => Some(sh::lobe::glsl_clamped_cosine(bands)),
-        "entity_at.glsl" => Some(layout::glsl_entity_at()),
-        "gloss_entity_at.glsl" => Some(layout::glsl_gloss_entity_at()),
-        "gloss_structs.glsl" => Some(layout::glsl_gloss_struct()),
         "product.glsl" => Some(glsl_subtract(bands, field_bands)),
-        "structs.glsl" => Some(layout::glsl_structs()),
         // One overload for each array length.
         "rotate.glsl" => {
             let more = if field_bands > bands { glsl_rotate(field_bands) } else { String::new() };
             Some(glsl_rotate(bands) + &more)
         }
-        _ => None,
+        _ => layout::glsl(name),
     }
 }

@@ -25,19 +25,15 @@ pub struct Readable<'b>(Bind<'b>);
 
 impl<'b> Readable<'b> {
     pub fn new(buffer: &'b Buffer, variant: Variant, format: vk::Format) -> Result<Self> {
-        Self::either(buffer, (variant.reads == Reads::Texels).then_some(format))
+        Ok(Readable(match variant.reads {
+            Reads::Texels => Bind::Texel(TexelView::new(buffer, format)?),
+            Reads::Storage | Reads::StorageUniform => Bind::Buffer(buffer),
+        }))
     }
 
     /// As [`Readable::new`] for what is the same in a whole workgroup, which some variants read as uniform blocks.
     pub fn shared(buffer: &'b Buffer, variant: Variant) -> Result<Self> {
         Self::new(buffer, variant, vk::Format::R32G32B32A32_SFLOAT)
-    }
-
-    fn either(buffer: &'b Buffer, texels: Option<vk::Format>) -> Result<Self> {
-        Ok(Readable(match texels {
-            Some(format) => Bind::Texel(TexelView::new(buffer, format)?),
-            None => Bind::Buffer(buffer),
-        }))
     }
 
     pub fn bind(&self) -> Bind<'b> {

@@ -203,9 +203,12 @@ impl Baker {
         report: &mut BakeReport,
         progress: Progress<'_>,
     ) -> Result<(FieldSamples, Vec<f32>)> {
-        let make_model = || match header.kind {
-            FieldKind::Radiance => Model::with_colors(&self.device, mesh),
-            FieldKind::Occlusion => self.model(mesh, header.level_texels),
+        let make_model = || {
+            if header.level_texels > 0.0 {
+                Model::with_levels(&self.device, mesh, self.leveled(mesh)?)
+            } else {
+                Model::new(&self.device, mesh, header.kind)
+            }
         };
         // They take about equally long, each mostly on one thread, so they are made side by side.
         let (samples, model) = rayon::join(|| FieldSamples::new(mesh, &header.lattice), make_model);
@@ -241,15 +244,6 @@ impl Baker {
         commands.barrier(Access::TransferWrite, Access::HostRead);
         report.add(&commands.submit()?);
         Ok(payload.read(0, bytes as usize))
-    }
-
-    /// A mesh as captures without colours show it: with levels where it may be missed by a share of a texel.
-    fn model(&self, mesh: &Mesh, level_texels: f64) -> Result<Model> {
-        if level_texels > 0.0 {
-            Model::with_levels(&self.device, mesh, self.leveled(mesh)?)
-        } else {
-            Model::new(&self.device, mesh)
-        }
     }
 
     /// The levels of a mesh, which are made when they are first asked for.

@@ -5,6 +5,7 @@ use super::levels::{Leveled, Tolerance};
 use super::triangles::{distinct, unit_positions};
 use crate::asset::Mesh;
 use crate::error::Result;
+use crate::field::FieldKind;
 use crate::gpu::{Buffer, BufferKind, Device};
 use crate::sh::cube::FACE_COUNT;
 use glam::Vec3;
@@ -28,19 +29,16 @@ pub struct Model {
 }
 
 impl Model {
-    /// A mesh without colours.
-    pub fn new(device: &Arc<Device>, mesh: &Mesh) -> Result<Self> {
+    /// A mesh as captures of a kind show it: with its colours for radiance, where one without any is white.
+    pub fn new(device: &Arc<Device>, mesh: &Mesh, kind: FieldKind) -> Result<Self> {
         let Chunked { vertices, triangles, chunks } = chunk(&unit_positions(mesh), &distinct(mesh))?;
-        Self::upload(device, mesh, &vertices, &triangles, Cut::Whole(chunks))
-    }
-
-    /// A mesh with its colours for a radiance capture; without any it is white.
-    pub fn with_colors(device: &Arc<Device>, mesh: &Mesh) -> Result<Self> {
-        let Chunked { vertices, triangles, chunks } = chunk(&unit_positions(mesh), &distinct(mesh))?;
-        let color = |&vertex: &u32| mesh.colors.as_ref().map_or(Vec3::ONE, |colors| colors[vertex as usize]).to_array();
-        let colors: Vec<[f32; 3]> = vertices.iter().map(color).collect();
-        let model = Self::upload(device, mesh, &vertices, &triangles, Cut::Whole(chunks))?;
-        Ok(Model { colors: Some(Buffer::with_data(device, "capture colors", &colors)?), ..model })
+        let mut model = Self::upload(device, mesh, &vertices, &triangles, Cut::Whole(chunks))?;
+        if kind == FieldKind::Radiance {
+            let color = |&v: &u32| mesh.colors.as_ref().map_or(Vec3::ONE, |colors| colors[v as usize]).to_array();
+            let colors: Vec<[f32; 3]> = vertices.iter().map(color).collect();
+            model.colors = Some(Buffer::with_data(device, "capture colors", &colors)?);
+        }
+        Ok(model)
     }
 
     /// A mesh and its levels of detail (see [`super::levels`]), for captures that see no colours.

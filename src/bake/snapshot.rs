@@ -20,7 +20,7 @@ pub fn snapshot(
     kind: FieldKind,
 ) -> Result<Vec<Vec<f32>>> {
     let radiance = kind == FieldKind::Radiance;
-    let model = if radiance { Model::with_colors(device, mesh)? } else { Model::new(device, mesh)? };
+    let model = Model::new(device, mesh, kind)?;
     let capture = Capture::new(device, library, model, face_px, kind, Way::usual(device))?;
     let eyes: Vec<Vec3> = eyes.iter().map(|eye| eye.as_vec3()).collect();
     let texel_bytes = if radiance { 16 } else { 1 };

@@ -61,8 +61,7 @@ pub fn capture_of(
     way: Way,
 ) -> Result<Capture> {
     let device = baker.device();
-    let colors = kind == FieldKind::Radiance;
-    let mut model = if colors { Model::with_colors(device, mesh)? } else { Model::new(device, mesh)? };
+    let mut model = Model::new(device, mesh, kind)?;
     model.closed &= cull;
     Capture::new(device, baker.library(), model, face_px, kind, way)
 }

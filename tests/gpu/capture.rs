@@ -160,7 +160,7 @@ fn what_does_not_fit_waits_for_the_next_batch() {
         slots.dedup();
         assert_eq!(slots.len(), count, "no two faces share a place");
     }
-    let model = Model::new(&gpu.device, &mesh).unwrap();
+    let model = Model::new(&gpu.device, &mesh, FieldKind::Occlusion).unwrap();
     let face_px = gpu.device.limits.max_image_dimension2_d;
     let too_large = Capture::new(&gpu.device, &gpu.library, model, face_px, FieldKind::Occlusion, Way::Drawn);
     assert_eq!(too_large.err().map(|error| error.exit_code()), Some(4));

@@ -134,8 +134,8 @@ fn walk(
     for light in &candidates.lights {
         let entity = light.entity;
         let view = scope.view(spheres[light.entity as usize]);
-        let channels = if light.coloured == 0 { 1 } else { 3 };
-        let sharp = light.sharp != 0;
+        let channels = if light.coloured { 3 } else { 1 };
+        let sharp = light.sharp;
         let mut result = scope.light_result(light, &view);
         if result == CullResult::Listed {
             chain(Some((entity, &view)), sharp, light.radiance, &mut results);
@@ -147,7 +147,7 @@ fn walk(
             occlude(Some(entity), sharp, &results, out, &mut tell);
             out.extend((0..channels).map(|channel| {
                 let last = channel + 1 == channels;
-                ListEntry::Shine { entity, channel: (light.coloured != 0).then_some(channel), last }.pack()
+                ListEntry::Shine { entity, channel: light.coloured.then_some(channel), last }.pack()
             }));
             if sharp {
                 sharp_count = out.len() - first;

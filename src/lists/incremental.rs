@@ -36,13 +36,6 @@ struct WatchedGroup {
     bounds: ClusterBounds,
 }
 
-/// Clusters of one group that have changed since they were merged.
-struct GroupChange {
-    /// Those that the camera may see.
-    seen: Dirty,
-    hidden: Dirty,
-}
-
 /// Clusters of one group that are to be merged.
 pub(crate) struct Dirty {
     group: usize,
@@ -80,9 +73,8 @@ pub(crate) struct ClusterLists {
     now: Option<State>,
     /// Every cluster has changed since the last update by something that no [`State`] holds.
     renewed: bool,
-    /// Clusters that have changed since they were merged, and how many they are.
+    /// Which clusters have changed since they were merged.
     stale: Vec<bool>,
-    stale_count: usize,
 }
 
 /// Words before the runs of a list of [`ClusterLists::reflectors`].
@@ -185,20 +177,16 @@ impl ClusterLists {
         let sights = sights.filter(|_| now.scene_bounds.skip.hidden && !first && !at_rest);
         // Without the skip all clusters count as changed.
         let moved = moved.filter(|_| now.scene_bounds.skip.unmoved);
-        let found: Vec<GroupChange> = if moved.is_some() && at_rest && self.stale_count == 0 {
+        let found: Vec<(Dirty, Vec<usize>)> = if moved.is_some() && at_rest && self.stale_count() == 0 {
             Vec::new()
         } else {
             let groups = (0..self.groups.len()).into_par_iter();
             groups.filter_map(|group| self.changed(group, &now, moved.as_ref(), sights)).collect()
         };
         let mut dirty = Vec::with_capacity(found.len());
-        for GroupChange { seen, hidden } in found {
-            for (list, stale) in [(&seen, false), (&hidden, true)] {
-                for &cluster in &list.clusters {
-                    let was = std::mem::replace(&mut self.stale[cluster], stale);
-                    self.stale_count = self.stale_count + usize::from(stale) - usize::from(was);
-                }
-            }
+        for (seen, hidden) in found {
+            seen.clusters.iter().for_each(|&cluster| self.stale[cluster] = false);
+            hidden.iter().for_each(|&cluster| self.stale[cluster] = true);
             dirty.extend((!seen.clusters.is_empty()).then_some(seen));
         }
         self.now = Some(now);
@@ -207,7 +195,7 @@ impl ClusterLists {
 
     /// Clusters that have changed since they were merged.
     pub fn stale_count(&self) -> usize {
-        self.stale_count
+        self.stale.iter().filter(|stale| **stale).count()
     }
 
     /// Clusters that none of the sights of their receivers sees.
@@ -233,13 +221,14 @@ impl ClusterLists {
         self.now.as_ref().expect("updated before")
     }
 
+    /// Clusters of a group that have changed since they were merged: those that may be seen, and the others.
     fn changed(
         &self,
         index: usize,
         now: &State,
         moved: Option<&Moved<'_>>,
         sights: Option<&[Vec<Sight>]>,
-    ) -> Option<GroupChange> {
+    ) -> Option<(Dirty, Vec<usize>)> {
         let group = &self.groups[index];
         let mut clusters: Vec<usize> = group.clusters.clone().collect();
         if let Some(moved) = moved.filter(|moved| !(moved.merges_all || moved.flags[group.receiver])) {
@@ -254,10 +243,19 @@ impl ClusterLists {
         }
         let is_seen = |cluster: &usize| sights.is_none_or(|sights| self.is_seen(*cluster, sights));
         let (seen, hidden) = clusters.into_iter().partition(is_seen);
-        Some(GroupChange {
-            seen: Dirty { group: index, clusters: seen },
-            hidden: Dirty { group: index, clusters: hidden },
-        })
+        Some((Dirty { group: index, clusters: seen }, hidden))
+    }
+
+    /// What may matter to a group at a time.
+    fn candidates(state: &State, group: &WatchedGroup) -> Candidates {
+        let entity = &state.entities[group.receiver];
+        Candidates::of_group(&state.scene_bounds, group.receiver as u32, entity, &group.bounds)
+    }
+
+    /// The rule of one cluster's list at a time.
+    fn scope<'s>(&'s self, state: &'s State, receiver: usize, cluster: usize) -> Scope<'s> {
+        let entity = &state.entities[receiver];
+        Scope::new(&state.scene_bounds, receiver, entity, &self.bounds[cluster], self.near(cluster))
     }
 
     /// The entries of clusters at the last update's time: clusters that know their place among the entries, and the
@@ -266,14 +264,11 @@ impl ClusterLists {
         let now = self.now();
         let of_group = |dirty: &Dirty| {
             let group = &self.groups[dirty.group];
-            let entity = &now.entities[group.receiver];
-            let candidates = Candidates::of_group(&now.scene_bounds, group.receiver as u32, entity, &group.bounds);
+            let candidates = Self::candidates(now, group);
             let mut ends = Vec::with_capacity(dirty.clusters.len());
             let mut entries = Vec::new();
             for &cluster in &dirty.clusters {
-                let scope =
-                    Scope::new(&now.scene_bounds, group.receiver, entity, &self.bounds[cluster], self.near(cluster));
-                let sharp = gather::gather(&scope, &candidates, &mut entries);
+                let sharp = gather::gather(&self.scope(now, group.receiver, cluster), &candidates, &mut entries);
                 ends.push((entries.len(), sharp as u32));
             }
             (ends, entries)
@@ -397,30 +392,20 @@ impl ClusterLists {
     /// What all lists of a time leave off, and why.
     pub fn counts(&self, state: &State) -> Counts {
         let of_group = |group: &WatchedGroup| {
-            let entity = &state.entities[group.receiver];
-            group.clusters.clone().fold(Counts::default(), |mut counts, cluster| {
-                let bounds = &self.bounds[cluster];
-                let scope = Scope::new(&state.scene_bounds, group.receiver, entity, bounds, self.near(cluster));
-                counts += gather::counts(&scope, group.receiver as u32);
-                counts
-            })
+            let receiver = group.receiver;
+            let of_cluster = |cluster| gather::counts(&self.scope(state, receiver, cluster), receiver as u32);
+            group.clusters.clone().map(of_cluster).fold(Counts::default(), Counts::plus)
         };
-        self.groups.par_iter().map(of_group).reduce(Counts::default, |mut a, b| {
-            a += b;
-            a
-        })
+        self.groups.par_iter().map(of_group).reduce(Counts::default, Counts::plus)
     }
 
     /// Entities on the lists of a receiver's clusters at a time.
     pub fn entities_on(&self, state: &State, receiver: usize) -> BTreeSet<usize> {
         let mut entries = Vec::new();
-        let entity = &state.entities[receiver];
         for group in self.groups.iter().filter(|group| group.receiver == receiver) {
-            let candidates = Candidates::of_group(&state.scene_bounds, receiver as u32, entity, &group.bounds);
+            let candidates = Self::candidates(state, group);
             for cluster in group.clusters.clone() {
-                let bounds = &self.bounds[cluster];
-                let scope = Scope::new(&state.scene_bounds, receiver, entity, bounds, self.near(cluster));
-                gather::gather(&scope, &candidates, &mut entries);
+                gather::gather(&self.scope(state, receiver, cluster), &candidates, &mut entries);
             }
         }
         entries.into_iter().map(|entry| ListEntry::entities(entry)[0] as usize).collect()

@@ -6,7 +6,6 @@ use crate::field::silhouette::SilhouetteField;
 use crate::lists::skip::Skip;
 use crate::lists::tree::Tree;
 use crate::scene::groups::Groups;
-use bytemuck::{Pod, Zeroable};
 use glam::{DQuat, DVec3, Vec3};
 use serde::Serialize;
 use std::f64::consts::PI;
@@ -17,8 +16,7 @@ use std::sync::Arc;
 const CONE_ROUNDING_RAD: f64 = 1e-3;
 
 /// Where a cluster's vertices are and where they face, in its mesh's frame: metres from the bounding sphere's centre.
-#[repr(C)]
-#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ClusterBounds {
     /// Centre of a sphere around the vertices.
     pub centre: [f32; 3],
@@ -106,8 +104,7 @@ pub struct OutlineView {
 }
 
 /// A light as the gather sees it.
-#[repr(C)]
-#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ListLight {
     /// Axis (world) and cosine of the half-angle, with `CONE_ROUNDING_RAD`, of a cone of directions outside of which
     /// its radiance field is zero; cosine -2 where it shines all round.
@@ -115,10 +112,9 @@ pub struct ListLight {
     /// Largest radiance that it shines with, of any colour.
     pub radiance: f32,
     pub entity: u32,
-    /// 1 where it shines through a radiance field of three channels, else 0.
-    pub coloured: u32,
-    /// 1 where its light is sharp, else 0.
-    pub sharp: u32,
+    /// Whether it shines through a radiance field of three channels.
+    pub coloured: bool,
+    pub sharp: bool,
 }
 
 /// What the lists are made from at one time.
@@ -157,20 +153,18 @@ impl SceneBounds {
             }),
             radiance: entity.radiance as f32,
             entity: j as u32,
-            coloured: u32::from(entity.coloured),
-            sharp: u32::from(entity.sharp),
+            coloured: entity.coloured,
+            sharp: entity.sharp,
         });
         // The chains of sharp lights come first on every list.
-        let (sharp, others): (Vec<ListLight>, Vec<ListLight>) = lights.partition(|light| light.sharp != 0);
+        let (sharp, others): (Vec<ListLight>, Vec<ListLight>) = lights.partition(|light| light.sharp);
         let lights = [sharp, others].concat();
         let sky = sky.map(|sky| sky as f32);
         let brightest = lights.iter().map(|light| light.radiance).fold(sky.unwrap_or(0.0), f32::max);
         let tree = Tree::new(occluders.iter().map(|&j| (j, spheres[j as usize])));
-        let outlines = Vec::new();
-        let groups = None;
         SceneBounds {
-            groups,
-            outlines,
+            groups: None,
+            outlines: Vec::new(),
             tree,
             occluders,
             lights,
@@ -248,10 +242,9 @@ impl Counts {
         let lights = self.behind_light + self.facing_away + self.passed_by + self.covered;
         lights + self.below_horizon + self.apart + self.own + self.below_eps
     }
-}
 
-impl std::ops::AddAssign for Counts {
-    fn add_assign(&mut self, other: Self) {
+    /// The sums, and the larger bound.
+    pub(crate) fn plus(mut self, other: Self) -> Self {
         self.considered += other.considered;
         self.behind_light += other.behind_light;
         self.below_horizon += other.below_horizon;
@@ -267,5 +260,6 @@ impl std::ops::AddAssign for Counts {
         self.hidden += other.hidden;
         self.undrawn += other.undrawn;
         self.dropped_bound = self.dropped_bound.max(other.dropped_bound);
+        self
     }
 }

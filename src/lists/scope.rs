@@ -432,7 +432,7 @@ impl<'m> Scope<'m> {
             || lights.any(|light| {
                 let light_view = self.view(scene.spheres[light.entity as usize]);
                 self.light_result(light, &light_view) == CullResult::Listed
-                    && (light.entity as usize == index || blocks(Some(&light_view), light.sharp != 0, light.radiance))
+                    && (light.entity as usize == index || blocks(Some(&light_view), light.sharp, light.radiance))
             })
     }
 }

@@ -111,26 +111,20 @@ impl Texels {
         Ok(Texels { width, height, rgba })
     }
 
-    /// Linear colour and alpha of a texel.
-    fn linear(&self, x: usize, y: usize) -> Vec4 {
-        let [r, g, b, a] = self.rgba[y * self.width + x];
-        Vec3::from_array([r, g, b].map(|byte| LINEAR[usize::from(byte)])).extend(f32::from(a) / 255.0)
-    }
-
-    /// The linear colour and alpha at texture coordinates, v upwards.
-    pub fn at(&self, uv: Vec2, wrap: [Wrap; 2]) -> Vec4 {
-        self.linear(wrap[0].texel(uv.x, self.width), wrap[1].texel(1.0 - uv.y, self.height))
-    }
-
-    fn alpha_at(&self, uv: Vec2, wrap: [Wrap; 2]) -> f32 {
+    /// The texel at texture coordinates, v upwards.
+    fn texel(&self, uv: Vec2, wrap: [Wrap; 2]) -> [u8; 4] {
         let [x, y] = [wrap[0].texel(uv.x, self.width), wrap[1].texel(1.0 - uv.y, self.height)];
-        f32::from(self.rgba[y * self.width + x][3]) / 255.0
+        self.rgba[y * self.width + x]
+    }
+
+    /// The linear colour and alpha at texture coordinates.
+    pub fn at(&self, uv: Vec2, wrap: [Wrap; 2]) -> Vec4 {
+        linear(&self.texel(uv, wrap))
     }
 
     /// What is stored at texture coordinates, 0 to 1: of a picture that holds no colours.
     pub fn numbers_at(&self, uv: Vec2, wrap: [Wrap; 2]) -> Vec4 {
-        let [x, y] = [wrap[0].texel(uv.x, self.width), wrap[1].texel(1.0 - uv.y, self.height)];
-        Vec4::from_array(self.rgba[y * self.width + x].map(|byte| f32::from(byte) / 255.0))
+        Vec4::from_array(self.texel(uv, wrap).map(|byte| f32::from(byte) / 255.0))
     }
 
     /// Whether any texel lets light through.
@@ -140,8 +134,8 @@ impl Texels {
 
     /// The mean linear colour.
     pub fn mean(&self) -> Vec3 {
-        let all = (0..self.rgba.len()).map(|i| self.linear(i % self.width, i / self.width).truncate().as_dvec3());
-        (all.sum::<DVec3>() / self.rgba.len() as f64).as_vec3()
+        let sum: DVec3 = self.rgba.iter().map(|texel| linear(texel).truncate().as_dvec3()).sum();
+        (sum / self.rgba.len() as f64).as_vec3()
     }
 
     /// The means of red, green and blue as they are stored, 0 to 1: of a picture that holds no colours.
@@ -152,8 +146,7 @@ impl Texels {
 
     /// The next level of detail of a picture that holds numbers: the mean of two by two texels.
     pub fn halved_numbers(&self) -> Texels {
-        self.halved_by(|four| {
-            let texels = four.map(|(x, y)| self.rgba[y * self.width + x]);
+        self.halved_by(|texels| {
             let sum = |channel: usize| texels.iter().map(|texel| u32::from(texel[channel])).sum::<u32>();
             std::array::from_fn(|channel| ((sum(channel) + 2) / 4) as u8)
         })
@@ -162,7 +155,7 @@ impl Texels {
     /// The next level of detail, half as wide and high: the mean of two by two texels, of linear colour by alpha.
     pub fn halved(&self) -> Texels {
         self.halved_by(|four| {
-            let texels = four.map(|(x, y)| self.linear(x, y));
+            let texels = four.map(|texel| linear(&texel));
             let alpha: f32 = texels.iter().map(|texel| texel.w).sum();
             // Texels that are not seen have a colour only where none is seen.
             let weight = |texel: &Vec4| if alpha > 0.0 { texel.w / alpha } else { 0.25 };
@@ -172,18 +165,23 @@ impl Texels {
         })
     }
 
-    /// Half as wide and high, each texel from the places of two by two.
-    fn halved_by(&self, mean: impl Fn([(usize, usize); 4]) -> [u8; 4] + Sync) -> Texels {
+    /// Half as wide and high, each texel from two by two.
+    fn halved_by(&self, mean: impl Fn([[u8; 4]; 4]) -> [u8; 4] + Sync) -> Texels {
         let width = (self.width / 2).max(1);
         let height = (self.height / 2).max(1);
-        let place = |i: usize, k: usize| {
+        let from = |i: usize, k: usize| {
             let x = (2 * (i % width) + k % 2).min(self.width - 1);
             let y = (2 * (i / width) + k / 2).min(self.height - 1);
-            (x, y)
+            self.rgba[y * self.width + x]
         };
-        let texel = |i: usize| mean([0, 1, 2, 3].map(|k| place(i, k)));
+        let texel = |i: usize| mean([0, 1, 2, 3].map(|k| from(i, k)));
         Texels { width, height, rgba: (0..width * height).into_par_iter().map(texel).collect() }
     }
+}
+
+/// Linear colour and alpha of a texel.
+fn linear([r, g, b, a]: &[u8; 4]) -> Vec4 {
+    Vec3::from_array([r, g, b].map(|byte| LINEAR[usize::from(*byte)])).extend(f32::from(*a) / 255.0)
 }
 
 /// The reflectance that varies over a surface: `factor`, times a texture, times the colours of the mesh's vertices.
@@ -218,7 +216,7 @@ impl Texture {
         let varies = self.alpha_blend || self.alpha_cutoff.is_some();
         let Some((texels, uvs)) = self.texels.as_ref().zip(mesh.uvs.as_ref()).filter(|_| varies) else { return 1.0 };
         let uv: Vec2 = corners.iter().zip(weights).map(|(&v, weight)| weight * uvs[v as usize]).sum();
-        let alpha = texels.alpha_at(uv, self.wrap);
+        let alpha = f32::from(texels.texel(uv, self.wrap)[3]) / 255.0;
         self.alpha_cutoff.map_or(alpha, |cutoff| if alpha < cutoff { 0.0 } else { 1.0 })
     }
 

@@ -122,7 +122,7 @@ impl Generator {
             Cuboid { size_m, cells } => cuboid(size_m, cells),
             Disc { radius_m } => panel::disc(radius_m)?,
             Rectangle { size_m } => panel::rectangle(size_m)?,
-            Teapot { subdivisions } => teapot::teapot(teapot::CONTROL_TEXT, subdivisions)?,
+            Teapot { subdivisions } => teapot::teapot(subdivisions),
         })
     }
 }

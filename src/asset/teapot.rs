@@ -5,10 +5,9 @@ use std::collections::HashMap;
 use glam::{DVec3, IVec3, Vec3};
 
 use super::mesh::Mesh;
-use crate::error::{Error, Result};
 
 /// The control points; source and credit stand in its header and in `assets/CREDITS.md`.
-pub const CONTROL_TEXT: &str = include_str!("../../assets/newell_teapot.txt");
+const CONTROL_TEXT: &str = include_str!("../../assets/newell_teapot.txt");
 /// Squares along a patch edge that give about 6 000 triangles.
 pub const DEFAULT_SUBDIVISIONS: u32 = 10;
 /// Heights are divided by this, as in renderings of the teapot since Blinn.
@@ -21,17 +20,17 @@ const WELD_COSINE: f64 = 1.0 - 1e-6;
 
 type Patch = [[DVec3; 4]; 4];
 
-/// Tessellates the patches of `control_text` with `subdivisions` squares along each edge.
+/// Tessellates the patches with `subdivisions` squares along each edge.
 ///
 /// The result has y up, spout towards +x, handle towards -x, its base on y = 0, and is in units of the original table
 /// taken as metres (6.4 m from handle to spout, 2.4 m high). Normals are analytic, and point out of the body. Where a
 /// patch edge collapses to a point, the limit of the normal is taken and triangles without area are dropped. The mesh
 /// is not closed: the lid rests on an open pot, and spout and handle reach into it.
-pub fn teapot(control_text: &str, subdivisions: u32) -> Result<Mesh> {
+pub fn teapot(subdivisions: u32) -> Mesh {
     assert!(subdivisions > 0, "teapot: no subdivisions");
     let mut weld = Weld::default();
     let mut triangles = Vec::new();
-    for patch in patches(control_text)? {
+    for patch in patches() {
         let row = subdivisions + 1;
         let vertices: Vec<u32> = (0..row * row)
             .map(|i| {
@@ -50,34 +49,28 @@ pub fn teapot(control_text: &str, subdivisions: u32) -> Result<Mesh> {
             triangles.extend([[a, c, b], [a, d, c]]);
         }
     }
-    Mesh::new("teapot", weld.positions, weld.normals, None, triangles)
+    Mesh::new("teapot", weld.positions, weld.normals, None, triangles).expect("the teapot is a mesh")
 }
 
 /// Reads `v x y z` and `p` lines; turns z up into y up and squeezes the vertical.
-fn patches(text: &str) -> Result<Vec<Patch>> {
-    let bad = |line: usize| Error::Input(format!("teapot control points, line {line}: malformed"));
+fn patches() -> Vec<Patch> {
     let mut points: Vec<DVec3> = Vec::new();
     let mut patches = Vec::new();
-    for (i, line) in text.lines().enumerate() {
+    for line in CONTROL_TEXT.lines() {
         let words: Vec<&str> = line.split_whitespace().collect();
         match words[..] {
             ["v", x, y, z] => {
-                let number = |w: &str| w.parse::<f64>().map_err(|_| bad(i + 1));
-                points.push(DVec3::new(number(x)?, number(z)? / VERTICAL_SQUEEZE, -number(y)?));
+                let [x, y, z] = [x, y, z].map(|word| word.parse::<f64>().expect("a coordinate"));
+                points.push(DVec3::new(x, z / VERTICAL_SQUEEZE, -y));
             }
-            ["p", ref indices @ ..] if indices.len() == 16 => {
-                let mut patch = [[DVec3::ZERO; 4]; 4];
-                for (k, word) in indices.iter().enumerate() {
-                    let point = word.parse::<usize>().ok().and_then(|index| points.get(index));
-                    patch[k / 4][k % 4] = *point.ok_or_else(|| bad(i + 1))?;
-                }
-                patches.push(patch);
+            ["p", ref indices @ ..] => {
+                let point = |k: usize| points[indices[k].parse::<usize>().expect("a point's number")];
+                patches.push(std::array::from_fn(|row| std::array::from_fn(|column| point(4 * row + column))));
             }
-            ["#", ..] | [] => {}
-            _ => return Err(bad(i + 1)),
+            _ => {}
         }
     }
-    Ok(patches)
+    patches
 }
 
 /// Cubic Bernstein polynomials and their derivatives at `t`.

@@ -4,12 +4,12 @@
 pub use super::names::field_name;
 use super::names::{identity, silhouette_identity, silhouette_name};
 use super::silhouette::{bake_silhouette, silhouette_header};
-use super::surfaces::{BakedSurface, GroupPlan, StoredGroup};
+use super::surfaces::{BakedSurface, GroupPlan};
 use super::{BakeReport, Baker, Options, Progress};
 use crate::asset::mesh::Mesh;
 use crate::error::Result;
 use crate::field::file::{self, SURFACES_MAGIC};
-use crate::field::silhouette::{SilhouetteField, SilhouetteHeader};
+use crate::field::silhouette::SilhouetteField;
 use crate::field::{FieldHeader, ShadowField};
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
@@ -61,30 +61,42 @@ impl Cache {
         Some(self.folder.as_ref()?.join(format!("{key}.{ending}")))
     }
 
-    fn exists(&self, key: &str, ending: &str) -> bool {
-        self.path(key, ending).is_some_and(|path| path.exists())
-    }
-
     fn memory(&self) -> MutexGuard<'_, InMemory> {
         self.memory.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     fn has<T>(&self, shelf: &Shelf<T>, key: &str) -> bool {
-        (shelf.memory)(&mut self.memory()).contains_key(key) || self.exists(key, shelf.ending)
+        (shelf.memory)(&mut self.memory()).contains_key(key)
+            || self.path(key, shelf.ending).is_some_and(|path| path.exists())
     }
 
-    /// What a shelf holds under `key`, read by `read` where it is on disk.
-    fn look<T>(&self, shelf: &Shelf<T>, key: &str, read: impl FnOnce(&Path) -> Option<T>) -> Option<Arc<T>> {
+    /// What a shelf holds under `key`. `read` reads it where it is on disk, and finds nothing in a file that holds
+    /// something else than its name says.
+    fn look<T>(&self, shelf: &Shelf<T>, key: &str, read: impl FnOnce(&Path) -> Result<Option<T>>) -> Option<Arc<T>> {
         let found = (shelf.memory)(&mut self.memory()).get(key).cloned();
-        found.or_else(|| self.path(key, shelf.ending).as_deref().and_then(read).map(Arc::new))
+        if found.is_some() {
+            return found;
+        }
+        let path = self.path(key, shelf.ending).filter(|path| path.exists())?;
+        let why = match read(&path) {
+            Ok(Some(found)) => return Some(Arc::new(found)),
+            Ok(None) => "it does not fit its name".into(),
+            Err(error) => error.to_string(),
+        };
+        log::warn!("{}: {why}; baking anew", path.display());
+        None
     }
 
     /// Puts what was made on a shelf: by `write`, or in memory where it cannot be written.
     fn keep<T>(&self, shelf: &Shelf<T>, key: String, made: T, write: impl FnOnce(&Path, &T) -> Result<()>) -> Arc<T> {
         let made = Arc::new(made);
-        if !is_kept(self.path(&key, shelf.ending).as_deref(), |path| write(path, &made)) {
-            (shelf.memory)(&mut self.memory()).insert(key, made.clone());
+        if let Some(path) = self.path(&key, shelf.ending) {
+            match write(&path, &made) {
+                Ok(()) => return made,
+                Err(error) => log::warn!("{error}; it is kept in memory only"),
+            }
         }
+        (shelf.memory)(&mut self.memory()).insert(key, made.clone());
         made
     }
 
@@ -112,7 +124,14 @@ impl Cache {
         progress: Progress<'_>,
     ) -> Result<CacheAnswer<ShadowField>> {
         let name = field_name(header);
-        if let Some(found) = self.look(&FIELDS, &name, |path| read_field(path, header)) {
+        let read = |path: &Path| {
+            let mut found = ShadowField::read(path)?;
+            let fits = identity(&found.header) == identity(header);
+            // The mesh may have another name by now.
+            found.header.mesh.clone_from(&header.mesh);
+            Ok(fits.then_some(found))
+        };
+        if let Some(found) = self.look(&FIELDS, &name, read) {
             return Ok((found, None));
         }
         let (made, report) = baker.field(mesh, header.clone(), progress)?;
@@ -130,7 +149,13 @@ impl Cache {
         let name = silhouette_name(mesh, options);
         let options = options.silhouette;
         let header = silhouette_header(mesh, options);
-        if let Some(found) = self.look(&SILHOUETTES, &name, |path| read_silhouette(path, &header)) {
+        let read = |path: &Path| {
+            let mut found = SilhouetteField::read(path)?;
+            let fits = silhouette_identity(&found.header) == silhouette_identity(&header);
+            found.header.mesh.clone_from(&header.mesh);
+            Ok(fits.then_some(found))
+        };
+        if let Some(found) = self.look(&SILHOUETTES, &name, read) {
             return Ok((found, None));
         }
         let (made, report) = bake_silhouette(baker, mesh, options, progress)?;
@@ -141,9 +166,8 @@ impl Cache {
     pub fn surfaces(&self, group: &GroupPlan, progress: Progress<'_>) -> CacheAnswer<Vec<BakedSurface>> {
         let Some(key) = &group.key else { return (Arc::new(group.plain()), None) };
         let read = |path: &Path| {
-            let fits = |found: &Option<Vec<BakedSurface>>| found.is_some();
-            let restore = |(header, payload): (StoredGroup, Vec<u8>)| group.restore(&header, &payload);
-            fitting(path, |path| file::read(path, SURFACES_MAGIC).map(restore), fits).flatten()
+            let (header, payload) = file::read(path, SURFACES_MAGIC)?;
+            Ok(group.restore(&header, &payload))
         };
         if let Some(found) = self.look(&SURFACES, key, read) {
             return (found, None);
@@ -155,42 +179,4 @@ impl Cache {
         };
         (self.keep(&SURFACES, key.clone(), made, write), Some(report))
     }
-}
-
-/// Writes to a path, if there is one. Answers whether the content is on disk now.
-fn is_kept(path: Option<&Path>, write: impl FnOnce(&Path) -> Result<()>) -> bool {
-    let Some(path) = path else { return false };
-    match write(path) {
-        Ok(()) => true,
-        Err(error) => {
-            log::warn!("{error}; it is kept in memory only");
-            false
-        }
-    }
-}
-
-/// What a file holds. `None` if the file is missing or damaged or holds something else than its name says.
-fn fitting<T>(path: &Path, read: impl FnOnce(&Path) -> Result<T>, fits: impl FnOnce(&T) -> bool) -> Option<T> {
-    let why = match path.exists().then(|| read(path))? {
-        Ok(found) if fits(&found) => return Some(found),
-        Ok(_) => "it does not fit its name".into(),
-        Err(error) => error.to_string(),
-    };
-    log::warn!("{}: {why}; baking anew", path.display());
-    None
-}
-
-/// The field in a file, with the mesh's present name.
-fn read_field(path: &Path, header: &FieldHeader) -> Option<ShadowField> {
-    let mut found = fitting(path, ShadowField::read, |found| identity(&found.header) == identity(header))?;
-    found.header.mesh.clone_from(&header.mesh);
-    Some(found)
-}
-
-/// The silhouette field in a file, with the mesh's present name.
-fn read_silhouette(path: &Path, header: &SilhouetteHeader) -> Option<SilhouetteField> {
-    let fits = |found: &SilhouetteField| silhouette_identity(&found.header) == silhouette_identity(header);
-    let mut found = fitting(path, SilhouetteField::read, fits)?;
-    found.header.mesh.clone_from(&header.mesh);
-    Some(found)
 }

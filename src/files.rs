@@ -83,7 +83,6 @@ pub fn check_writable(path: &Path) -> Result<()> {
     if folder.is_dir() { unfinished(folder).map(drop) } else { Err(missing(folder)) }
 }
 
-/// The folder that a file stands in.
 fn folder_of(path: &Path) -> &Path {
     path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."))
 }

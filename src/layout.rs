@@ -5,7 +5,6 @@ use ash::vk;
 use bytemuck::{Pod, Zeroable};
 use std::fmt::Write;
 
-/// A type of a shared struct's field.
 trait Shared {
     /// Its name in GLSL.
     const GLSL: &'static str;
@@ -65,11 +64,8 @@ shared_struct! {
         centre: [f32; 4],
         /// Cosine and sine of alpha and of beta; the rotation to the world is Rz(alpha) Ry(beta) Rz(gamma).
         alpha_beta: [f32; 4],
-        /// Cosine and sine of gamma.
         gamma: [f32; 2],
-        /// First quad of the occlusion field.
         blocked_base: u32,
-        /// First quad of the radiance field.
         radiance_base: u32,
         /// Slope and offset of the shell coordinate, inner and outer shell radius in r.
         radial: [f32; 4],
@@ -82,7 +78,6 @@ shared_struct! {
         shift: [f32; 4],
         /// Albedo / pi.
         albedo: [f32; 3],
-        /// Uniform scale of the entity.
         scale: f32,
         /// First axis of its projected area ([`crate::field::Area`]), world; w = the area's constant term. Of a sheet
         /// these two are the axes of its rectangle.
@@ -107,7 +102,6 @@ shared_struct! {
 }
 
 impl DeviceEntity {
-    /// Whether its light has a cone.
     pub fn is_spot(&self) -> bool {
         self.light_ramp[0] > 0.0
     }
@@ -150,7 +144,6 @@ shared_struct! {
         row_x: [f32; 4],
         row_y: [f32; 4],
         row_z: [f32; 4],
-        /// Mean albedo.
         albedo: [f32; 3],
         roughness: f32,
         /// Place of the eye in the world.
@@ -239,7 +232,6 @@ fn glsl_reader(function: &str, view: &str, texel: &str, fields: &[SharedField]) 
     text
 }
 
-/// The index that means "none".
 pub const NONE: u32 = u32::MAX;
 
 /// Vertices of a cluster, which is one workgroup: eight subgroups on llvmpipe, two on most GPUs, and within the limits
@@ -264,29 +256,13 @@ pub const ENTRY_ENTITIES: u32 = (1 << ENTRY_BITS) - 1;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ListEntry {
     /// Multiply the chain of a light (`None`: of the sky) by the visibility past an entity.
-    Occlude {
-        /// The occluder.
-        entity: u32,
-        /// Whose chain it is.
-        light: Option<u32>,
-    },
+    Occlude { entity: u32, light: Option<u32> },
     /// As [`ListEntry::Occlude`], for vertices that see the entity small.
-    Cap {
-        /// The occluder.
-        entity: u32,
-        /// Whose chain it is.
-        light: Option<u32>,
-    },
+    Cap { entity: u32, light: Option<u32> },
     /// As [`ListEntry::Occlude`], of a sheet.
-    Sheet {
-        /// The occluder.
-        entity: u32,
-        /// Whose chain it is.
-        light: Option<u32>,
-    },
+    Sheet { entity: u32, light: Option<u32> },
     /// Meet a light; `channel` is `None` for a light of one colour, which shares the occlusion field.
     Shine {
-        /// The light.
         entity: u32,
         /// Channel of its radiance field.
         channel: Option<u32>,
@@ -301,7 +277,6 @@ impl ListEntry {
         [packed & ENTRY_ENTITIES, packed >> ENTRY_BITS & ENTRY_ENTITIES]
     }
 
-    /// Whether packed bits meet a light.
     pub fn is_light(packed: u32) -> bool {
         packed >> (2 * ENTRY_BITS) & 1 == 1
     }

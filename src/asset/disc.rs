@@ -25,7 +25,6 @@ pub struct Sun {
     pub radiance: Vec3,
 }
 
-/// [`SUN_DEG`], for serde.
 fn sun_deg() -> f32 {
     SUN_DEG
 }
@@ -50,7 +49,6 @@ impl Sun {
     }
 }
 
-/// Refuses an angular diameter out of range.
 pub(super) fn check_angle(what: &str, angle_deg: f32) -> Result<()> {
     let (low, high) = ANGLES_DEG;
     if (low..=high).contains(&angle_deg) {

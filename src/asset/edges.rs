@@ -10,7 +10,6 @@ const CREASE_COSINE: f32 = 0.996;
 /// of f32 positions.
 const COPLANAR_SINE: f64 = 1e-5;
 
-/// When an edge is seen.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum EdgeKind {
     /// When exactly one of its two faces looks at the eye; `flipped` if their windings are opposite.

@@ -56,7 +56,6 @@ fn entry(path: &Path) -> Option<&'static (&'static str, &'static [u8])> {
     FILES.iter().find(|(name, _)| *name == below)
 }
 
-/// [`find`] as a reader of files.
 pub fn read(path: &Path) -> Result<Vec<u8>> {
     find(path).map(<[u8]>::to_vec).ok_or_else(|| Error::input(path, "no such embedded file"))
 }

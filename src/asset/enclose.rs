@@ -73,7 +73,6 @@ fn smallest_ball(positions: &[Vec3], start: DVec3) -> Ball {
     ball
 }
 
-/// The point farthest from `centre`, and its distance.
 fn farthest(positions: &[Vec3], centre: DVec3) -> (DVec3, f64) {
     let squared = |p: &Vec3| p.as_dvec3().distance_squared(centre);
     let (index, most) = positions

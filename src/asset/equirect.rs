@@ -35,7 +35,6 @@ pub struct Equirect {
     height: usize,
     texels: Vec<[f32; 3]>,
     peak: Option<Disc>,
-    /// Its projection to [`MAX_BANDS`] bands.
     coefficients: [Vec<f64>; 3],
 }
 

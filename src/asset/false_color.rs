@@ -17,7 +17,6 @@ pub enum Scheme {
     Absolute,
 }
 
-/// The mapping from errors to colours.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
 pub struct ColorScale {
     pub scheme: Scheme,

@@ -55,7 +55,6 @@ pub struct Attributes {
 }
 
 impl Attributes {
-    /// The attributes of some vertices, in that order.
     fn pick(&self, used: &[u32]) -> Self {
         fn of<T: Copy>(from: &Option<Vec<T>>, used: &[u32]) -> Option<Vec<T>> {
             from.as_ref().map(|all| used.iter().map(|&i| all[i as usize]).collect())
@@ -195,7 +194,6 @@ impl Mesh {
         steps
     }
 
-    /// Total area in square metres.
     pub fn area_m2(&self) -> f64 {
         area_m2(&self.positions, &self.triangles)
     }

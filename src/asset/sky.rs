@@ -84,7 +84,6 @@ impl Sky {
 pub struct Dome {
     /// Direction to the sun, unit.
     sun: DVec3,
-    /// Half the sun's angular diameter, radians.
     sun_half_angle_rad: f64,
     /// Linear RGB radiance of the sun's disc.
     sun_radiance: DVec3,
@@ -96,7 +95,6 @@ pub struct Dome {
     scale: f64,
     /// Linear RGB radiance below the horizon.
     ground: DVec3,
-    /// Projection to [`MAX_BANDS`] bands.
     coefficients: [Vec<f64>; 3],
 }
 
@@ -147,7 +145,6 @@ impl Dome {
         if direction.y > 0.0 { self.above(direction) } else { self.ground }
     }
 
-    /// The sun's disc.
     pub fn disc(&self) -> Disc {
         let Dome { sun: toward, sun_half_angle_rad: half_angle_rad, sun_radiance: radiance, .. } = *self;
         Disc { name: "sun of the sky", toward, half_angle_rad, radiance }

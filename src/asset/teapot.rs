@@ -73,7 +73,6 @@ fn patches() -> Vec<Patch> {
     patches
 }
 
-/// Cubic Bernstein polynomials and their derivatives at `t`.
 fn bernstein(t: f64) -> ([f64; 4], [f64; 4]) {
     let s = 1.0 - t;
     let value = [s * s * s, 3.0 * s * s * t, 3.0 * s * t * t, t * t * t];

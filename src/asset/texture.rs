@@ -132,7 +132,6 @@ impl Texels {
         self.rgba.iter().any(|texel| texel[3] < u8::MAX)
     }
 
-    /// The mean linear colour.
     pub fn mean(&self) -> Vec3 {
         let sum: DVec3 = self.rgba.iter().map(|texel| linear(texel).truncate().as_dvec3()).sum();
         (sum / self.rgba.len() as f64).as_vec3()

@@ -80,7 +80,6 @@ pub(super) fn weld(positions: &[Vec3], triangles: &[[u32; 3]]) -> (Vec<u32>, Vec
     (triangles.iter().flatten().map(|&i| welded[i as usize]).collect(), distinct)
 }
 
-/// The sides of all triangles, in order.
 pub(super) fn sides(corners: &[u32]) -> Vec<HalfEdge> {
     let mut sides: Vec<HalfEdge> = (0..corners.len()).map(|corner| side(corners, corner)).collect();
     sides.sort_unstable();

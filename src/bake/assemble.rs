@@ -29,7 +29,6 @@ pub struct Source {
 pub struct Sources {
     /// Where each stored sample's list begins, and at last where the last list ends.
     pub offsets: Vec<u32>,
-    /// Captured samples.
     pub list: Vec<Source>,
 }
 
@@ -156,7 +155,6 @@ struct Push {
     factor: f32,
 }
 
-/// The pipeline for one storage format.
 pub struct Assemble {
     pipeline: ComputePipeline,
 }
@@ -168,7 +166,6 @@ impl Assemble {
             .define("WORKGROUP", WORKGROUP)
     }
 
-    /// A pipeline that stores `storage`.
     pub fn new(device: &Arc<Device>, library: &Library, storage: Storage) -> Result<Self> {
         let shader = library.shader(&Self::row(storage))?;
         Ok(Assemble { pipeline: ComputePipeline::new(device, "assemble", &shader)? })

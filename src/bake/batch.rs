@@ -20,7 +20,6 @@ pub(super) struct Batches {
     project: Project,
     coefficients: Buffer,
     results: Buffer,
-    /// Floats of a sample.
     stride: usize,
 }
 

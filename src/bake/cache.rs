@@ -31,11 +31,8 @@ struct InMemory {
     surfaces: HashMap<String, Arc<Vec<BakedSurface>>>,
 }
 
-/// Where one kind of content is kept.
 struct Shelf<T> {
-    /// Ending of its files.
     ending: &'static str,
-    /// Its place in memory.
     memory: fn(&mut InMemory) -> &mut HashMap<String, Arc<T>>,
 }
 
@@ -100,17 +97,14 @@ impl Cache {
         made
     }
 
-    /// Whether the field that `header` describes is there.
     pub fn has_field(&self, header: &FieldHeader) -> bool {
         self.has(&FIELDS, &field_name(header))
     }
 
-    /// Whether the silhouette field of a mesh is there.
     pub fn has_silhouette(&self, mesh: &Mesh, options: &Options) -> bool {
         self.has(&SILHOUETTES, &silhouette_name(mesh, options))
     }
 
-    /// Whether the surfaces of a group are there.
     pub fn has_surfaces(&self, group: &GroupPlan) -> bool {
         group.key.as_ref().is_none_or(|key| self.has(&SURFACES, key))
     }

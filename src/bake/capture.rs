@@ -39,10 +39,8 @@ struct Push {
     forward: [f32; 4],
 }
 
-/// How faces are captured.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Way {
-    /// By the device's own rasteriser.
     Drawn,
     /// By a compute shader ([`super::raster`]), as on software devices. Colours are drawn all the same: to find the
     /// nearest triangle of a texel takes a second round over all of them, and with the atlas of 16 bytes a texel four
@@ -51,7 +49,6 @@ pub enum Way {
 }
 
 impl Way {
-    /// The way that is faster on a device.
     pub fn usual(device: &Device) -> Self {
         if device.info.is_software() { Way::Computed } else { Way::Drawn }
     }
@@ -72,14 +69,12 @@ enum Shown {
     Computed(RasterFaces),
 }
 
-/// What the faces of a batch show.
 pub struct Drawn {
     faces: Vec<DrawnFace>,
     shown: Shown,
 }
 
 impl Drawn {
-    /// How the atlas is written.
     pub fn access(&self) -> Access {
         if matches!(self.shown, Shown::Computed(_)) { Access::TransferWrite } else { Access::ColorWrite }
     }
@@ -94,13 +89,11 @@ impl Drawn {
     }
 }
 
-/// A model, the atlas, and what writes it.
 pub struct Capture {
     pub(super) model: Model,
     writer: Writer,
     /// Captured faces, row by row.
     pub atlas: Image,
-    /// Edge of a face in texels.
     pub face_px: u32,
     /// Faces in a row of the atlas.
     pub columns: u32,
@@ -173,7 +166,6 @@ impl Capture {
         GraphicsPipeline::new(device, "capture", &library.shader(&vertex)?, &library.shader(&fragment)?, state)
     }
 
-    /// Faces that the atlas holds.
     pub fn capacity(&self) -> u32 {
         self.columns * self.columns
     }
@@ -200,7 +192,6 @@ impl Capture {
         batches
     }
 
-    /// Chooses what the faces of a batch show.
     pub fn choose(&self, eyes: &[Vec3], slots: &[Slots]) -> Result<Drawn> {
         let shown = |buffer: &mut Vec<Range<u32>>, (&eye, slots): (&Vec3, &Slots)| -> Vec<DrawnFace> {
             let chunks = self.model.shown(eye, self.face_px, buffer);

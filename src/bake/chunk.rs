@@ -83,7 +83,6 @@ impl Chunked {
     }
 }
 
-/// The positions as meshoptimizer takes them.
 pub(super) fn adapter(positions: &[Vec3]) -> Result<VertexDataAdapter<'_>> {
     VertexDataAdapter::new(bytemuck::cast_slice(positions), size_of::<Vec3>(), 0)
         .map_err(|error| Error::Failed(format!("the mesh cannot be cut into chunks: {error}")))

@@ -19,7 +19,6 @@ use std::sync::Arc;
 /// A function that is told the name of what is being baked, the samples that are done, and the samples in all.
 pub type SceneProgress<'p> = &'p dyn Fn(&str, u32, u32);
 
-/// What one bake cost.
 #[derive(Clone, Debug, serde::Serialize)]
 pub struct Baked {
     /// Name of the mesh, and the kind of field.
@@ -40,7 +39,6 @@ pub struct BakedMesh {
 pub struct BakedScene {
     pub meshes: Vec<BakedMesh>,
     pub surfaces: Vec<BakedSurface>,
-    /// The surface of each entity.
     pub surface_of: Vec<usize>,
     /// For each entity and each of its clusters the entities whose shadows of sharp lights its maps have.
     pub near: Vec<Vec<Vec<u32>>>,
@@ -117,7 +115,6 @@ impl SceneNeeds {
     }
 }
 
-/// The name of a field's bake.
 fn field_title(mesh: &Mesh, header: &FieldHeader) -> String {
     let word = if header.kind == FieldKind::Radiance { "light" } else { "shadow" };
     format!("{} {word}", mesh.name)

@@ -79,7 +79,6 @@ impl Tolerance {
     }
 }
 
-/// Chunks that are simplified together.
 struct Group {
     bounds: GroupBounds,
     siblings: Range<usize>,

@@ -44,7 +44,6 @@ impl Runs {
         runs
     }
 
-    /// How many there are.
     pub fn count(&self) -> u32 {
         self.count
     }

@@ -115,7 +115,6 @@ pub struct Wanted {
 
 impl Wanted {
     pub const BOTH: Wanted = Wanted { transfer: true, self_visibility: true };
-    /// Transfer vectors alone.
     pub const TRANSFER: Wanted = Wanted { transfer: true, self_visibility: false };
 }
 
@@ -129,7 +128,6 @@ pub struct Baker {
 }
 
 impl Baker {
-    /// A baker that compiles its shaders from `library`.
     pub fn new(device: &Arc<Device>, library: &Library) -> Self {
         Baker { device: device.clone(), library: library.clone(), leveled: Mutex::default() }
     }
@@ -262,12 +260,10 @@ impl Baker {
         *self.leveled.lock().unwrap_or_else(PoisonError::into_inner) = None;
     }
 
-    /// The library that shaders come from.
     pub fn library(&self) -> &Library {
         &self.library
     }
 
-    /// The device that the baker works on.
     pub fn device(&self) -> &Arc<Device> {
         &self.device
     }

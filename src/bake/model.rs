@@ -12,7 +12,6 @@ use glam::Vec3;
 use std::ops::Range;
 use std::sync::Arc;
 
-/// How a mesh is cut into chunks.
 enum Cut {
     Whole(Vec<Chunk>),
     Levels(Arc<Leveled>),

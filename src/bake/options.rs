@@ -31,13 +31,11 @@ pub struct Options {
     pub bands: usize,
     /// SH bands of occlusion fields; `None` means as many as `bands`.
     pub field_bands: Option<usize>,
-    /// Number format of fields.
     pub storage: Storage,
     /// Sample points. The first shell may be left to the bake.
     pub lattice: Lattice,
     /// Edge of a captured face in texels.
     pub face_px: u32,
-    /// Silhouette fields.
     pub silhouette: SilhouetteOptions,
     /// Vertices to which the surfaces of a scene may be refined where light varies; 0 leaves meshes as they are.
     pub vertices: u32,
@@ -68,7 +66,6 @@ impl Default for Options {
 }
 
 impl Options {
-    /// SH bands of occlusion fields.
     pub fn occlusion_bands(&self) -> usize {
         self.field_bands.unwrap_or(self.bands)
     }
@@ -156,7 +153,6 @@ pub enum Quality {
 }
 
 impl Quality {
-    /// What it stands for.
     pub fn options(self) -> Options {
         let normal = Options { vertices: 40_000, groups: true, ..Options::default() };
         let lattice = |text: &str| text.parse().expect("a lattice of the table");

@@ -36,7 +36,6 @@ const EDGE_GAP: f32 = 0.01;
 /// Places that lie on one edge, one behind the other, are this close: 4 degrees.
 const CLOSE: f32 = 0.07;
 
-/// A ray of the pattern.
 #[derive(Clone, Copy)]
 struct PatternRay {
     /// z along the normal.
@@ -115,7 +114,6 @@ impl Pattern {
     }
 }
 
-/// How many rays a point casts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Rays {
     /// 256, to tell whether a surface is fine enough.
@@ -208,7 +206,6 @@ pub struct Standing {
     pub radius: f64,
 }
 
-/// Own visibility of one point.
 #[derive(Clone, Debug, Default)]
 pub struct Seen {
     /// `channel_stride(bands)` floats, in the object's frame.
@@ -224,7 +221,6 @@ pub struct Seen {
     pub fronts: Vec<Front>,
 }
 
-/// A front that a ray met.
 #[derive(Clone, Copy, Debug)]
 pub struct Front {
     pub member: u32,
@@ -248,7 +244,6 @@ impl Seen {
     }
 }
 
-/// What blocks a point.
 #[derive(Clone, Copy)]
 pub struct Counts<'c> {
     /// For each member whether it blocks at all.
@@ -298,7 +293,6 @@ fn locals<'r>(rays: impl IntoIterator<Item = &'r PatternRay>) -> Vec<Vec3A> {
     rays.into_iter().map(|ray| ray.local).collect()
 }
 
-/// Casts the rays of one point.
 pub fn see(blockers: &Blockers, standing: &Standing, eye: &Eye, bands: usize, rays: Rays, counts: Counts<'_>) -> Seen {
     let normal = eye.normal.as_dvec3();
     let to_object = frame(normal);
@@ -344,7 +338,6 @@ pub fn see(blockers: &Blockers, standing: &Standing, eye: &Eye, bands: usize, ra
     seen
 }
 
-/// A cell that an edge crosses.
 struct CutCell {
     cell: usize,
     /// Whether an edge of all that blocks crosses it, and one of what the map has.
@@ -484,7 +477,6 @@ impl CellHits {
     }
 }
 
-/// The place nearest to a direction.
 fn nearest_to(toward: Vec3A, places: &[(Vec3A, f32)]) -> Option<usize> {
     let mut nearest = None;
     let mut most = f32::NEG_INFINITY;

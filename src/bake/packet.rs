@@ -11,7 +11,6 @@ use obvhs::triangle::Triangle;
 use pulp::{Arch, Simd, WithSimd};
 use std::time::Duration;
 
-/// Rays of a packet.
 const LANES: usize = 16;
 /// How far beyond its sides a triangle reaches, as a share of them: no ray slips between two neighbours.
 const SLACK: f32 = 1e-5;
@@ -30,7 +29,6 @@ pub struct Blockers {
     backs: Vec<Option<u32>>,
 }
 
-/// A surface that has holes.
 #[derive(Clone)]
 pub struct Mask {
     /// For each triangle the place of its first corner in texels, and the ways from there to the others.
@@ -73,7 +71,6 @@ impl Mask {
     }
 }
 
-/// A triangle that blocks.
 #[derive(Clone, Copy, Debug)]
 pub struct BlockerTriangle {
     pub member: u32,
@@ -82,7 +79,6 @@ pub struct BlockerTriangle {
     pub corners: [Vec3; 3],
 }
 
-/// A corner and the two edges from it.
 #[derive(Clone, Copy)]
 struct Corners {
     corner: Vec3A,
@@ -198,7 +194,6 @@ impl Packet {
     }
 }
 
-/// The lanes as vectors of the processor.
 #[inline(always)]
 fn vectors<S: Simd>(lanes: &[f32; LANES]) -> &[S::f32s] {
     S::as_simd_f32s(lanes).0

@@ -22,7 +22,6 @@ use std::sync::Arc;
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
 pub struct SampleFaces {
-    /// Place of each face in the atlas.
     pub slots: Slots,
     /// Factor on coefficients.
     pub scale: f32,
@@ -48,18 +47,14 @@ fn workgroup(bands: usize, kind: FieldKind) -> u32 {
 #[repr(C)]
 #[derive(Clone, Copy, Pod, Zeroable)]
 struct Push {
-    /// Edge of a face in texels.
     face_px: u32,
-    /// Faces in a row of the atlas.
     atlas_columns: u32,
 }
 
-/// The pipeline with its texel table.
 pub struct Project {
     pipeline: ComputePipeline,
     texels: Buffer,
     pub bands: usize,
-    /// What its samples are of.
     pub kind: FieldKind,
     face_px: u32,
     columns: u32,
@@ -104,7 +99,6 @@ impl Project {
         Buffer::new(device, "samples with faces", BufferKind::Upload, bytes)
     }
 
-    /// Projects the first `sample_count` samples.
     pub fn record<'r>(
         &'r self,
         commands: &mut Commands<'r>,

@@ -36,9 +36,7 @@ pub struct Face {
     pub down: [f32; 4],
     /// Axis of the view.
     pub forward: [f32; 4],
-    /// Place in the atlas.
     pub slot: u32,
-    /// Number of its first range of indices.
     pub range_first: u32,
     pub range_count: u32,
     /// Fills the struct up to a multiple of 16 bytes.
@@ -54,7 +52,6 @@ struct Push {
     culls: u32,
 }
 
-/// The pipeline, and the buffer that it writes.
 pub struct Raster {
     pipeline: ComputePipeline,
     texels: Buffer,
@@ -76,7 +73,6 @@ pub(super) fn face_axes(face: usize) -> (Vec3, Vec3, Vec3) {
 }
 
 impl RasterFaces {
-    /// Uploads what faces show.
     pub fn new(device: &Arc<Device>, shown: &[DrawnFace]) -> Result<Self> {
         let mut faces = Vec::new();
         let mut ranges = Vec::new();
@@ -102,7 +98,6 @@ impl RasterFaces {
 }
 
 impl Raster {
-    /// The row of the shader table.
     pub fn row() -> ShaderPermutation {
         ShaderPermutation::new("raster.comp", 4).define("WORKGROUP", WORKGROUP).define("WORDS", WORDS)
     }

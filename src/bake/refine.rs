@@ -181,7 +181,6 @@ impl Refined {
         self.positions.len() as u32 - 1
     }
 
-    /// Cuts every edge that is longer than `most_m`.
     fn cut_longest(&mut self, most_m: f32, budget: usize) {
         while self.positions.len() < budget {
             let long: HashSet<Edge> =
@@ -194,7 +193,6 @@ impl Refined {
     }
 }
 
-/// How finely a group is refined.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Limits {
     /// Vertices of all surfaces together.

@@ -21,7 +21,6 @@ pub(super) struct Sample {
 pub(super) struct FieldSamples {
     /// Those that are captured: all that see anything, once at each place.
     pub captured: Vec<Sample>,
-    /// Number of samples inside the solid.
     pub inside_count: u32,
     /// The captured samples that each stored sample is assembled from.
     pub sources: Sources,

@@ -37,7 +37,6 @@ const WORKGROUP: u32 = 64;
 pub struct SilhouetteOptions {
     /// Cells along an edge of a cube face of the node grid.
     pub cells: u32,
-    /// Texels along an edge of a map.
     pub map_px: u32,
     /// Pixels along an edge of the view that a map is reduced from.
     pub view_px: u32,
@@ -78,7 +77,6 @@ fn extent(mesh: &Mesh) -> [[f32; 3]; 2] {
     [low.to_array(), high.to_array()]
 }
 
-/// Frames of all maps of a field.
 fn frames(mesh: &Mesh, nodes: &NodeGrid, count: usize) -> Vec<MapFrame> {
     let positions: Vec<DVec3> = unit_positions(mesh).iter().map(|p| p.as_dvec3()).collect();
     let maps = (0..count).into_par_iter();
@@ -210,7 +208,6 @@ impl Silhouette {
         })
     }
 
-    /// Views that one render pass holds.
     pub fn capacity(&self) -> usize {
         (self.atlas_columns * self.atlas_columns) as usize
     }

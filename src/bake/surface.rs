@@ -34,7 +34,6 @@ struct SurfaceNode {
     second: usize,
 }
 
-/// Triangles in a tree.
 pub struct Surface {
     triangles: Vec<[DVec3; 3]>,
     nodes: Vec<SurfaceNode>,

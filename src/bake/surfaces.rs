@@ -43,7 +43,6 @@ const BURIED_BLOCKED: f64 = 0.35;
 /// Places on the way from a buried vertex to the middle of a triangle where one that is not may be.
 const WAYS_OUT: [f32; 5] = [0.06, 0.15, 0.3, 0.5, 0.8];
 
-/// One entity of a group.
 #[derive(Clone)]
 pub struct Member {
     pub mesh: Arc<Mesh>,
@@ -62,7 +61,6 @@ pub struct Member {
     pub refines: bool,
 }
 
-/// What is baked of one group.
 #[derive(Clone)]
 pub struct GroupPlan {
     /// The members' entities, of one group of several; every entity with this mesh of a group of one.
@@ -90,7 +88,6 @@ pub struct BakedSurface {
     pub links: Option<Arc<Links>>,
 }
 
-/// Links of vertices.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Links {
     /// How many each vertex has.
@@ -176,7 +173,6 @@ impl GroupPlan {
         GroupPlan { entities: Vec::new(), members, wanted, bands, refinement: None, key: None }.named()
     }
 
-    /// The plan with its name in the cache.
     fn named(mut self) -> Self {
         self.key = self.needs_bake().then(|| self.name());
         self
@@ -552,7 +548,6 @@ impl GroupSpace<'_> {
 
 /// The vertices that are lit on the triangles of a mesh.
 struct Lit {
-    /// Vertices in the order of clusters.
     order: Vec<u32>,
     /// For each triangle of the mesh: the first of its cells, and how many lie along a side of its square.
     grids: Vec<(u32, u32)>,
@@ -680,7 +675,6 @@ struct StoredSurface {
     clusters: usize,
 }
 
-/// The header of a cached group.
 #[derive(Debug, PartialEq, Serialize, Deserialize)]
 pub(super) struct StoredGroup {
     key: String,
@@ -693,7 +687,6 @@ fn vectors<'p, T: bytemuck::Pod>(take: &mut impl FnMut(usize) -> Option<&'p [u8]
 }
 
 impl GroupPlan {
-    /// Header and payload of what was baked.
     pub(super) fn store(&self, surfaces: &[BakedSurface]) -> (StoredGroup, Vec<u8>) {
         let mut payload = Vec::new();
         let mut stored = Vec::new();

@@ -36,7 +36,6 @@ impl Area {
         Self::fit(&samples)
     }
 
-    /// Least-squares fit to samples of (direction, weight, area).
     fn fit(samples: &[(DVec3, f64, f64)]) -> Self {
         let outer = |d: DVec3| DMat3::from_cols(d * d.x, d * d.y, d * d.z);
         let moment = samples.iter().fold(DMat3::ZERO, |sum, &(d, weight, area)| sum + outer(d) * (weight * area));

@@ -18,13 +18,10 @@ use serde::de::DeserializeOwned;
 use std::io::Read;
 use std::path::Path;
 
-/// First bytes of a field file.
 pub const FIELD_MAGIC: [u8; 8] = *b"SHFIELD\n";
-/// First bytes of a cached file of surfaces.
 pub const SURFACES_MAGIC: [u8; 8] = *b"SHSURFA\n";
 /// Version that this program writes and reads. It increases whenever the meaning of header or payload changes.
 pub const VERSION: u32 = 11;
-/// Longest header that is read.
 const HEADER_LIMIT: u64 = 64 << 10;
 /// Largest payload that is read: 4 GiB.
 pub const PAYLOAD_LIMIT: u64 = 4 << 30;
@@ -110,18 +107,15 @@ fn read_from<H: DeserializeOwned>(
 }
 
 impl ShadowField {
-    /// Writes the field to an `.sf` file.
     pub fn write(&self, path: &Path) -> Result<()> {
         write(path, FIELD_MAGIC, &self.header, &self.payload)
     }
 
-    /// Reads an `.sf` file.
     pub fn read(path: &Path) -> Result<Self> {
         let (header, payload) = read(path, FIELD_MAGIC)?;
         Self::new(header, payload).map_err(|error| Error::input(path, error))
     }
 
-    /// A field of what a file holds.
     pub fn new(header: FieldHeader, payload: Vec<u8>) -> Result<Self> {
         header.validate()?;
         if header.payload_bytes() != payload.len() as u64 {

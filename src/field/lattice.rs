@@ -79,7 +79,6 @@ pub const ROOMY_INNER: f64 = 0.25;
 /// Stored samples to interpolate, with weights that are at least 0 and sum to 1.
 #[derive(Clone, Copy, Debug)]
 pub struct Corners {
-    /// Stored indices.
     pub index: [u32; 4],
     pub weight: [f64; 4],
 }
@@ -89,7 +88,6 @@ fn chord(d: f64) -> f64 {
     (cap_height(d) / 2.0).sqrt()
 }
 
-/// Inverse of [`chord`].
 fn chord_distance(coordinate: f64) -> f64 {
     let half_angle = 2.0 * coordinate.clamp(0.0, 1.0).asin();
     if half_angle <= FRAC_PI_2 { 1.0 / half_angle.sin() } else { half_angle.sin() }

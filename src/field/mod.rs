@@ -32,9 +32,7 @@ pub struct FieldHeader {
     pub kind: FieldKind,
     /// SH bands; bands^2 coefficients a channel.
     pub bands: usize,
-    /// Number format of the coefficients.
     pub storage: Storage,
-    /// Sample points.
     pub lattice: Lattice,
     /// Edge of the captured cube faces in texels.
     pub face_px: u32,
@@ -51,7 +49,6 @@ pub struct FieldHeader {
     pub growth: f64,
     /// Centre of the bounding sphere in the mesh's own frame, metres.
     pub centre_m: [f32; 3],
-    /// Radius of the bounding sphere, metres.
     pub radius_m: f32,
     /// Radiance fields: factor on the stored coefficients, so that f16 can represent any brightness. Occlusion fields:
     /// 1.
@@ -82,7 +79,6 @@ impl FieldHeader {
         u64::from(self.lattice.stored_count()) * (self.sample_stride() * self.storage.bytes()) as u64
     }
 
-    /// Checks every number against its range.
     pub fn validate(&self) -> Result<()> {
         self.lattice.validate()?;
         let bad = |what: String| Err(Error::Input(what));
@@ -101,7 +97,6 @@ impl FieldHeader {
     }
 }
 
-/// A field in host memory.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ShadowField {
     pub header: FieldHeader,

@@ -13,7 +13,6 @@ pub enum FieldKind {
 }
 
 impl FieldKind {
-    /// Channels of a sample.
     pub fn channels(self) -> usize {
         match self {
             FieldKind::Occlusion => 1,
@@ -27,7 +26,6 @@ impl FieldKind {
 #[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
 #[serde(rename_all = "lowercase")]
 pub enum Storage {
-    /// 32-bit floats.
     F32,
     /// 16-bit floats. The error is below 1e-3 of the blocked part; magnitudes below 2^-14 are stored as 0.
     #[default]
@@ -35,7 +33,6 @@ pub enum Storage {
 }
 
 impl Storage {
-    /// Bytes of one coefficient.
     pub fn bytes(self) -> usize {
         match self {
             Storage::F32 => 4,

@@ -70,17 +70,14 @@ pub fn node_direction(node: usize) -> DVec3 {
     flat.extend(1.0 - flat.x.abs() - flat.y.abs()).normalize()
 }
 
-/// The byte of a signed angle in radians.
 pub fn encode_angle(angle_rad: f64) -> u8 {
     encode(angle_rad, LIMIT_RAD)
 }
 
-/// Inverse of [`encode_angle`].
 pub fn decode_angle(byte: u8) -> f64 {
     decode(byte, LIMIT_RAD)
 }
 
-/// The byte of a distance in r.
 pub fn encode_distance(distance: f64) -> u8 {
     ((distance.log2() - DISTANCE_FIRST) * DISTANCE_STEPS).round().clamp(0.0, 255.0) as u8
 }

@@ -27,7 +27,6 @@ pub fn height_over(height: f64, of_centre: f64, facing: f64, contact: f64) -> f6
 pub struct Rectangle {
     /// Unit vectors along its sides.
     pub axes: [DVec3; 2],
-    /// Half its sides, metres.
     pub half_m: [f64; 2],
 }
 
@@ -106,7 +105,6 @@ impl Sheet {
 }
 
 impl SheetView {
-    /// Its corners from the point.
     pub fn corners(&self) -> [DVec3; 4] {
         let [x, y, z] = self.axes;
         let [[x0, x1], [y0, y1]] = self.ends;
@@ -175,7 +173,6 @@ impl SheetView {
 /// What sheets leave of a small round light.
 #[derive(Clone, Copy, Debug)]
 pub struct SheetShadow {
-    /// The share that is free.
     pub free: f64,
     /// Unit normal, towards what is blocked, of the plane through the point and the side that runs nearest to the light.
     edge: DVec3,

@@ -28,7 +28,6 @@ use glam::{DVec2, DVec3};
 use std::f64::consts::PI;
 use std::path::Path;
 
-/// First bytes of a silhouette field's file.
 pub const SILHOUETTE_MAGIC: [u8; 8] = *b"SHOUTLN\n";
 /// Largest distance from the outline that a map holds, inside or outside, in r.
 pub const REACH: f64 = 0.5;
@@ -94,7 +93,6 @@ impl MapFrame {
     }
 }
 
-/// Result of a lookup along a ray.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Outline {
     /// Signed distance of the ray from the outline, in r: positive where the ray meets the object.
@@ -106,7 +104,6 @@ pub struct Outline {
 /// The four maps that serve all rays through one point in directions close to each other.
 #[derive(Clone, Copy, Debug)]
 pub struct Near {
-    /// The point, in the object's frame.
     point: DVec3,
     cell: Cell,
     maps: [NearMap; 4],
@@ -123,7 +120,6 @@ struct NearMap {
     sign: f64,
     /// Steps on the map, -1 to 1 from edge to edge, per r of the object's frame.
     rows: [DVec3; 2],
-    /// Place of the point on the map.
     place: DVec2,
     /// Place on the map of the ray's point that is nearest to the sphere's centre.
     foot: DVec2,
@@ -143,7 +139,6 @@ impl NearMap {
     }
 }
 
-/// A silhouette field in host memory.
 #[derive(Clone, Debug)]
 pub struct SilhouetteField {
     pub header: SilhouetteHeader,
@@ -217,12 +212,10 @@ impl SilhouetteField {
         corners.into_iter().chain(self.nodes.nodes().iter().flat_map(node)).collect()
     }
 
-    /// Cells of a side of a map.
     fn side_cells(&self, side: Side) -> usize {
         self.header.edge_px(side).saturating_sub(1).pow(2)
     }
 
-    /// Whether it has maps of the object's halves.
     pub fn has_halves(&self) -> bool {
         self.header.half_px > 0
     }
@@ -251,18 +244,15 @@ impl SilhouetteField {
         &self.payload[first..first + self.header.texel_bytes(side)]
     }
 
-    /// Writes the field to an `.sf` file.
     pub fn write(&self, path: &Path) -> Result<()> {
         file::write(path, SILHOUETTE_MAGIC, &self.header, &self.payload)
     }
 
-    /// Reads an `.sf` file.
     pub fn read(path: &Path) -> Result<Self> {
         let (header, payload) = file::read(path, SILHOUETTE_MAGIC)?;
         Self::new(header, payload).map_err(|error| Error::input(path, error))
     }
 
-    /// Distance and depth of a texel.
     pub fn texel(&self, map: usize, side: Side, x: usize, y: usize) -> [f64; 2] {
         let texel = &self.texels(map, side)[2 * (y * self.header.edge_px(side) + x)..];
         [decode(texel[0], REACH), decode(texel[1], 1.0)]

@@ -59,7 +59,6 @@ pub struct SilhouetteHeader {
     pub level_pixels: f64,
     /// Centre of the bounding sphere in the mesh's own frame, metres.
     pub centre_m: [f32; 3],
-    /// Radius of the bounding sphere, metres.
     pub radius_m: f32,
     /// Least and largest coordinates of the mesh from that centre, in its own frame and in bounding radii.
     pub extent: [[f32; 3]; 2],
@@ -81,12 +80,10 @@ impl SilhouetteHeader {
         16 + self.texel_bytes(Side::Whole) + 2 * self.texel_bytes(Side::Far)
     }
 
-    /// Texels along an edge of a map's side.
     pub fn edge_px(&self, side: Side) -> usize {
         (if side == Side::Whole { self.map_px } else { self.half_px }) as usize
     }
 
-    /// Bytes of the texels of a map's side.
     pub fn texel_bytes(&self, side: Side) -> usize {
         2 * self.edge_px(side).pow(2)
     }
@@ -104,7 +101,6 @@ impl SilhouetteHeader {
         self.map_count() * self.map_bytes()
     }
 
-    /// Checks every number against its range.
     pub fn validate(&self) -> Result<()> {
         let bad = |what: String| Err(Error::Input(what));
         if !(1..=64).contains(&self.cells) {

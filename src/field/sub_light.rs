@@ -11,7 +11,6 @@
 use glam::{DQuat, DVec2, DVec3};
 use std::f64::consts::PI;
 
-/// Largest sine of a light's angular radius.
 pub const MOST_SINE: f64 = 0.9999;
 pub const BLOCK: usize = 4;
 /// Sine of the angular radius up to which a light is one block: 12 degrees. Larger lights are four.
@@ -108,7 +107,6 @@ pub fn fine_share(sine: f64) -> f64 {
 /// Only lights in this very direction or opposite to it have neighbours whose squares turn fast.
 pub const TURNED_BY: [f64; 3] = [0.36, -0.48, 0.8];
 
-/// A light as seen from a point.
 #[derive(Clone, Copy, Debug)]
 pub struct SeenLight {
     /// Unit direction of its centre.
@@ -256,7 +254,6 @@ impl LightPart {
         cut * cut / (4.0 * self.sine).max(f64::MIN_POSITIVE) + (cosine - self.sine).max(0.0)
     }
 
-    /// Tangent of its angular radius.
     pub fn tangent(&self) -> f64 {
         self.sine / (1.0 - self.sine * self.sine).sqrt()
     }

@@ -17,7 +17,6 @@ const FADE: f32 = 0.85;
 /// A run nearer to a cluster than so many of the cluster's radii is seen by each of its vertices, and from the second
 /// on by its middle alone.
 const NEAR: [f32; 2] = [1.5, 2.0];
-/// A run at rest.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct FarRun {
     /// Middle, world, metres, and how far its vertices lie from there.
@@ -48,7 +47,6 @@ pub struct Cut {
 }
 
 impl FarRuns {
-    /// The cut for what lies within a sphere.
     pub fn cut(&self, centre: Vec3, radius_m: f32) -> Cut {
         let mut cut = Cut::default();
         self.roots.iter().for_each(|&root| self.cut_below(root, 1.0, (centre, radius_m), &mut cut));

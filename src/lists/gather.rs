@@ -52,7 +52,6 @@ impl Candidates {
         Candidates { occluders, lights: lights.copied().collect() }
     }
 
-    /// How many occluders there are.
     pub fn occluder_count(&self) -> usize {
         self.occluders.len()
     }

@@ -21,7 +21,6 @@ use std::ops::Range;
 
 /// All that cluster lists and merge depend on at one time.
 pub(crate) struct State {
-    /// What the lists are made from.
     pub scene_bounds: SceneBounds,
     /// The entities as shaders read them.
     pub entities: Vec<layout::DeviceEntity>,
@@ -43,13 +42,11 @@ pub(crate) struct Dirty {
 }
 
 impl Dirty {
-    /// How many clusters these are.
     pub fn cluster_count(&self) -> usize {
         self.clusters.len()
     }
 }
 
-/// A cluster of one receiver.
 pub(crate) struct Member {
     /// The cluster; its list follows separately.
     pub cluster: layout::Cluster,
@@ -73,7 +70,6 @@ pub(crate) struct ClusterLists {
     now: Option<State>,
     /// Every cluster has changed since the last update by something that no [`State`] holds.
     renewed: bool,
-    /// Which clusters have changed since they were merged.
     stale: Vec<bool>,
 }
 
@@ -82,7 +78,6 @@ pub(crate) const CUT_HEADER: usize = 5;
 
 /// From which entities light bounces onto those of other groups.
 pub(crate) struct Reflectors<'r, I> {
-    /// Those that reflect.
     pub movers: I,
     /// Of every entity, whether it has a field by which others see it.
     pub reflects: &'r [bool],
@@ -411,14 +406,12 @@ impl ClusterLists {
         entries.into_iter().map(|entry| ListEntry::entities(entry)[0] as usize).collect()
     }
 
-    /// Host memory of the clusters, bytes.
     pub fn size_bytes(&self) -> u64 {
         (self.clusters.len()
             * (size_of::<layout::Cluster>() + size_of::<ClusterBounds>() + size_of::<TriangleRun>() + 1)) as u64
     }
 }
 
-/// Entities that have changed.
 struct Moved<'b> {
     before: &'b State,
     flags: Vec<bool>,

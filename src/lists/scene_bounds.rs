@@ -40,14 +40,12 @@ impl ClusterBounds {
         }
     }
 
-    /// Bounds of some vertices.
     pub fn new(positions: &[Vec3], normals: &[Vec3]) -> Self {
         let spheres = positions.iter().map(|p| (p.as_dvec3(), 0.0));
         let cones = normals.iter().map(|n| (n.as_dvec3(), 0.0));
         Self::around(spheres.collect(), cones.collect())
     }
 
-    /// Bounds of neighbouring clusters.
     pub fn union(parts: &[ClusterBounds]) -> Self {
         let vector = |v: [f32; 3]| Vec3::from_array(v).as_dvec3();
         let spheres = parts.iter().map(|b| (vector(b.centre), f64::from(b.radius_m)));
@@ -77,11 +75,8 @@ pub struct EntityBounds {
     pub radius_m: f64,
     /// Share of light that it reflects at most, of any colour.
     pub reflectance: f64,
-    /// Whether it casts shadows.
     pub occludes: bool,
-    /// Whether it shines.
     pub emits: bool,
-    /// Whether its light is sharp.
     pub sharp: bool,
     /// Whether it shines through a radiance field of its own rather than through its occlusion field.
     pub coloured: bool,
@@ -125,7 +120,6 @@ pub struct SceneBounds {
     /// Outlines of those that have a silhouette field, by entity; empty where no light is sharp.
     pub outlines: Vec<Option<OutlineView>>,
     pub tree: Tree,
-    /// Indices of those that occlude.
     pub occluders: Vec<u32>,
     /// Those that shine, the sharp ones first, each in the order of entities.
     pub lights: Vec<ListLight>,
@@ -133,7 +127,6 @@ pub struct SceneBounds {
     pub sky: Option<f32>,
     /// Radiance of the brightest light, distant or not.
     pub brightest: f32,
-    /// What is left off.
     pub skip: Skip,
     /// Which entities never move against each other; `None` where each is alone.
     pub groups: Option<Groups>,

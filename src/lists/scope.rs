@@ -78,7 +78,6 @@ impl Angle {
     }
 }
 
-/// A sphere as seen from a cluster.
 pub struct SphereView {
     /// Unit direction from the cluster's centre to the sphere's.
     toward: DVec3,
@@ -110,7 +109,6 @@ struct SheetSides {
 }
 
 impl SphereView {
-    /// Whether it is that of a sheet.
     pub fn is_sheet(&self) -> bool {
         self.sheet.is_some()
     }

@@ -70,7 +70,6 @@ impl TriangleRun {
         faces
     }
 
-    /// The run of some triangles of a mesh.
     pub fn of(mesh: &Mesh, triangles: &[[u32; 3]]) -> TriangleRun {
         let (middle, _) = mesh.bounding_sphere();
         let at = |v: u32| mesh.positions[v as usize] - middle;
@@ -179,7 +178,6 @@ impl Sight {
         Sight { planes, eye: (solid && outside).then(|| eye.as_vec3()), samples: camera.samples }
     }
 
-    /// Whether its backs are culled.
     pub fn culls(&self) -> bool {
         self.eye.is_some()
     }

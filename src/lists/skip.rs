@@ -21,7 +21,6 @@ pub enum SkipKind {
 pub struct SkipRow {
     /// Name on the command line.
     pub name: &'static str,
-    /// What it does to the numbers.
     pub kind: SkipKind,
     /// The macro of the merge shader, where that decides it too, vertex by vertex.
     pub glsl: Option<&'static str>,

@@ -13,7 +13,6 @@ pub struct Crowd {
     /// World, metres.
     pub centre: [f32; 3],
     pub reach_m: f32,
-    /// Largest bounding radius, metres.
     pub radius_m: f32,
 }
 
@@ -68,7 +67,6 @@ impl Tree {
         tree
     }
 
-    /// Its entities, neighbours beside each other.
     pub fn members(&self) -> &[u32] {
         &self.members
     }

@@ -11,14 +11,12 @@ use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
 use std::sync::Arc;
 
-/// Merge times of a device.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Calibration {
     /// Driver in its own words; another driver is measured anew.
     pub driver: String,
     /// Version of this program; its shaders differ from another's.
     pub program: String,
-    /// Name of the fastest variant.
     pub fastest: String,
     /// Milliseconds of the made-up scene, by variant; `None` of one that the driver refused.
     pub milliseconds: Vec<(String, Option<f64>)>,

@@ -41,17 +41,12 @@ impl<'b> Readable<'b> {
     }
 }
 
-/// Everything that a merge reads.
 pub struct MergeInputs<'b> {
-    /// [`crate::layout::DeviceEntity`] of every entity.
     pub entities: Readable<'b>,
     pub entries: Readable<'b>,
-    /// [`crate::layout::Cluster`] of every cluster.
     pub clusters: Readable<'b>,
     pub fields: Readable<'b>,
-    /// Transfer vectors.
     pub transfers: Readable<'b>,
-    /// Positions and normals.
     pub vertices: Readable<'b>,
     /// Coefficients of the sky, a channel after the other, [`crate::field::quantity::channel_stride`] floats apart;
     /// zero without one.

@@ -21,9 +21,7 @@ pub struct MergeObject<'f> {
     /// Bounding radius after scaling, metres.
     pub radius_m: f64,
     pub albedo_over_pi: [f64; 3],
-    /// Radiance factor of its light.
     pub emission: [f64; 3],
-    /// Occlusion field, if one was baked.
     pub blocked: Option<&'f ShadowField>,
     /// Fit of its solid angle from afar.
     pub area: Area,
@@ -35,7 +33,6 @@ pub struct MergeObject<'f> {
     pub opacity: f64,
 }
 
-/// One receiver under all lights.
 pub struct MergeTwin<'t> {
     pub objects: &'t [MergeObject<'t>],
     /// Index of the one that is lit.
@@ -47,7 +44,6 @@ pub struct MergeTwin<'t> {
     pub sky: Option<&'t [Vec<f64>; 3]>,
     /// Positions in the receiver's frame, metres from its sphere's centre.
     pub positions: &'t [DVec3],
-    /// Unit normals in the receiver's frame.
     pub normals: &'t [DVec3],
     /// Transfer vectors, `transfer_stride` floats apart; `None` for the cosine of the normal.
     pub transfer: Option<(&'t [f32], usize)>,

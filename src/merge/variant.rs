@@ -92,13 +92,11 @@ pub fn uniform_entities(device: &Device) -> u32 {
 /// A permutation of the merge shader: a variant, the shape of the fields, and the skips.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MergePermutation {
-    /// How it is done.
     pub variant: Variant,
     /// SH bands of transfer, light and products.
     pub bands: usize,
     /// SH bands of occlusion fields.
     pub field_bands: usize,
-    /// Number format of the fields.
     pub storage: Storage,
     /// Samples of the fields. First and last shell are data, not code.
     pub lattice: Lattice,

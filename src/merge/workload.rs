@@ -17,7 +17,6 @@ use std::sync::Arc;
 /// Bands of transfer and fields.
 const BANDS: usize = 4;
 
-/// The buffers of a made-up merge.
 pub struct Workload {
     /// Vertices that are lit.
     pub vertex_count: u32,
@@ -110,7 +109,6 @@ impl Workload {
         })
     }
 
-    /// Pairs of vertex and occluder in one merge.
     pub fn pairs(&self) -> u64 {
         u64::from(self.vertex_count) * u64::from(self.occluder_count)
     }
@@ -120,7 +118,6 @@ impl Workload {
         self.fields.size_bytes
     }
 
-    /// The permutation of the shader for a variant.
     pub fn permutation(&self, variant: Variant) -> MergePermutation {
         MergePermutation {
             gloss: false,

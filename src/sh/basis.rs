@@ -23,7 +23,6 @@ use super::program::{Program, Term, Value, elements};
 /// The largest number of bands that these modules support and their tests cover.
 pub const MAX_BANDS: usize = 8;
 
-/// Coefficients of the largest expansion.
 pub const MAX_COEFFICIENTS: usize = coefficient_count(MAX_BANDS);
 
 /// The value of Y00, the constant function: 1 / sqrt(4 pi).

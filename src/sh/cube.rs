@@ -8,7 +8,6 @@
 
 use glam::DVec3;
 
-/// Faces of a cube.
 pub const FACE_COUNT: usize = 6;
 
 /// (forward, right, down) of `face`, such that a texel's direction is `normalize(forward + s * right + t * down)`.

@@ -18,10 +18,8 @@ use super::basis::{Y00, evaluate};
 use glam::DVec3;
 use std::f64::consts::SQRT_2;
 
-/// Bands of the closed form.
 pub const POLYGON_BANDS: usize = 4;
 
-/// Coefficients of the closed form.
 pub const POLYGON_COEFFICIENTS: usize = POLYGON_BANDS * POLYGON_BANDS;
 
 /// The blocked part of a convex polygon, from both sides. `corners` are seen from the origin, in order around it; a

@@ -13,11 +13,8 @@ const ZERO: f64 = 1e-9;
 /// One non-zero entry of a tensor.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Entry {
-    /// Coefficient of the first factor.
     pub i: usize,
-    /// Coefficient of the second factor.
     pub j: usize,
-    /// Coefficient of the product.
     pub k: usize,
     /// The integral of `Y_i Y_j Y_k`.
     pub value: f64,
@@ -45,7 +42,6 @@ struct Pair {
     end: u16,
 }
 
-/// An [`Entry`] in 16 bytes.
 #[derive(Clone, Copy, Debug)]
 struct Single {
     i: u8,

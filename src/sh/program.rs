@@ -8,9 +8,7 @@ use std::fmt::Write;
 /// Operand of an instruction: an input of the program or a variable that an earlier instruction has set.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Value {
-    /// Position in the list of inputs.
     Input(usize),
-    /// Number of a variable.
     Variable(usize),
 }
 

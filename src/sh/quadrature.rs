@@ -49,7 +49,6 @@ pub fn sphere_rule(degree: usize) -> Vec<(DVec3, f64)> {
     rule
 }
 
-/// A uniform direction.
 pub fn random_direction(rng: &mut fastrand::Rng) -> DVec3 {
     let z = 2.0 * rng.f64() - 1.0;
     let azimuth = 2.0 * PI * rng.f64();

@@ -12,7 +12,7 @@ use super::triangles::{distinct, unit_positions};
 use crate::asset::Mesh;
 use crate::error::Result;
 use glam::Vec3;
-use meshopt::{ClodBounds, ClodConfig, ClodMesh, clod_build, clod_build_hierarchy, clod_default_config};
+use meshopt::{ClodBounds, ClodConfig, ClodMesh, clod_build, clod_default_config};
 use std::ops::Range;
 
 /// Largest displacement of what is captured, in texels of a face. The facets of a round body lie partly inside and
@@ -30,8 +30,6 @@ const GROUP_CHUNKS: usize = 8;
 /// moves the coefficients of a torus of 69 696 triangles by 0.0027 (relative RMS), with 0.6 by 0.0043; a rough mesh of
 /// 69 168 draws 15 % more triangles.
 const FARTHEST: f32 = 0.25;
-/// Children of a node of the tree over the groups.
-const NODE_CHILDREN: usize = 8;
 
 /// The share of a texel by which captures of a mesh may miss it where levels are wanted: 0 for meshes that are too
 /// small to have any.
@@ -91,24 +89,10 @@ struct Siblings {
     chunks: Range<u32>,
 }
 
-/// A node of the tree over the groups of one level.
-struct Node {
-    bounds: GroupBounds,
-    below: Below,
-}
-
-enum Below {
-    Group(usize),
-    Nodes(Range<usize>),
-}
-
 /// Which chunk is drawn in whose place.
 pub(super) struct Levels {
     groups: Vec<Group>,
     siblings: Vec<Siblings>,
-    /// The first nodes are the roots of the levels.
-    nodes: Vec<Node>,
-    depth: usize,
     indices: Vec<u32>,
 }
 
@@ -116,19 +100,10 @@ impl Levels {
     /// Puts ranges of the chunks that are drawn under a tolerance into `chosen`, in order.
     pub fn choose(&self, tolerance: Tolerance, chosen: &mut Vec<Range<u32>>) {
         chosen.clear();
-        let mut open: Vec<usize> = (0..self.depth).collect();
-        while let Some(node) = open.pop().map(|index| &self.nodes[index]) {
-            if !tolerance.forbids(&node.bounds) {
-                continue;
-            }
-            match &node.below {
-                Below::Nodes(children) => open.extend(children.clone()),
-                Below::Group(group) => {
-                    for Siblings { from, chunks } in &self.siblings[self.groups[*group].siblings.clone()] {
-                        if !from.is_some_and(|group| tolerance.forbids(&self.groups[group].bounds)) {
-                            chosen.push(chunks.clone());
-                        }
-                    }
+        for group in self.groups.iter().filter(|group| tolerance.forbids(&group.bounds)) {
+            for Siblings { from, chunks } in &self.siblings[group.siblings.clone()] {
+                if !from.is_some_and(|group| tolerance.forbids(&self.groups[group].bounds)) {
+                    chosen.push(chunks.clone());
                 }
             }
         }
@@ -185,7 +160,6 @@ fn leveled(positions: &[Vec3], triangles: &[[u32; 3]]) -> Result<(Chunked, Level
     let mut chunked = Chunked::default();
     let mut siblings = Vec::new();
     let mut groups = Vec::new();
-    let mut of_groups = Vec::new();
     clod_build(config, &ClodMesh::new(&welded, &adapter), |group, clusters| {
         let first = siblings.len();
         for alike in clusters.chunk_by(|a, b| a.refined == b.refined) {
@@ -194,24 +168,11 @@ fn leveled(positions: &[Vec3], triangles: &[[u32; 3]]) -> Result<(Chunked, Level
             let chunks = start..chunked.chunks.len() as u32;
             siblings.push(Siblings { from: usize::try_from(alike[0].refined).ok(), chunks });
         }
-        of_groups.push(group);
         groups.push(Group { bounds: group.simplified.into(), siblings: first..siblings.len() });
         groups.len() as i32 - 1
     });
-    let depth = of_groups.iter().map(|group| group.depth as usize + 1).max().unwrap_or(0);
-    let node = |node: meshopt::ClodNode| match usize::try_from(node.group) {
-        Ok(group) => Node { bounds: node.bounds.into(), below: Below::Group(group) },
-        // The margins cover rounding: what is forbidden for a group is forbidden for all nodes above.
-        Err(_) => {
-            let GroupBounds { centre, radius, error } = node.bounds.into();
-            let bounds = GroupBounds { centre, radius: 1.0001 * radius + 1e-6, error: 1.0001 * error };
-            let first = node.child_offset as usize;
-            Node { bounds, below: Below::Nodes(first..first + node.child_count as usize) }
-        }
-    };
-    let nodes = clod_build_hierarchy(&of_groups, NODE_CHILDREN, depth).into_iter().map(node).collect();
     let indices = chunked.triangles.as_flattened().to_vec();
-    Ok((chunked, Levels { groups, siblings, nodes, depth, indices }))
+    Ok((chunked, Levels { groups, siblings, indices }))
 }
 
 #[cfg(test)]

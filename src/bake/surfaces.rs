@@ -502,7 +502,7 @@ impl GroupSpace<'_> {
                         corners.map(|&v| mesh.positions[v as usize]).sum::<Vec3>() / 3.0
                     };
                     let middles =
-                        || around.get_or_init(|| Around::new(&mesh)).of(v).iter().map(|&triangle| middle(triangle));
+                        || around.get_or_init(|| triangles_around(&mesh))[v].iter().map(|&triangle| middle(triangle));
                     let mut ways = WAYS_OUT.iter().flat_map(|way| middles().map(|m| position.lerp(m, *way)));
                     let free = |place: &Vec3| !self.see(*place, normal, nudge, Rays::Few).buried;
                     ways.find(free).map_or(here, see)
@@ -631,33 +631,12 @@ fn is_within([a, b, c]: [[f32; 2]; 3], [x, y]: [f32; 2]) -> bool {
 }
 
 /// The triangles around every vertex of a mesh.
-struct Around {
-    triangles: Vec<u32>,
-    /// Where those of each vertex begin, and where those of the last end.
-    starts: Vec<u32>,
-}
-
-impl Around {
-    fn new(mesh: &Mesh) -> Self {
-        let mut starts = vec![0; mesh.positions.len() + 1];
-        mesh.triangles.iter().flatten().for_each(|&v| starts[v as usize + 1] += 1);
-        for v in 1..starts.len() {
-            starts[v] += starts[v - 1];
-        }
-        let mut next = starts.clone();
-        let mut triangles = vec![0; 3 * mesh.triangles.len()];
-        for (index, triangle) in mesh.triangles.iter().enumerate() {
-            for &v in triangle {
-                triangles[next[v as usize] as usize] = index as u32;
-                next[v as usize] += 1;
-            }
-        }
-        Around { triangles, starts }
+fn triangles_around(mesh: &Mesh) -> Vec<Vec<u32>> {
+    let mut around = vec![Vec::new(); mesh.positions.len()];
+    for (index, triangle) in (0..).zip(&mesh.triangles) {
+        triangle.iter().for_each(|&v| around[v as usize].push(index));
     }
-
-    fn of(&self, v: usize) -> &[u32] {
-        &self.triangles[self.starts[v] as usize..self.starts[v + 1] as usize]
-    }
+    around
 }
 
 /// How a surface is kept in the cache.

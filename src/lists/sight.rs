@@ -46,24 +46,18 @@ impl TriangleRun {
         for (place, &v) in order.iter().enumerate() {
             run_of[v as usize] = (place / count) as u32;
         }
-        let runs_of = |triangle: &[u32; 3]| {
-            let [a, b, c] = triangle.map(|v| run_of[v as usize]);
-            [Some(a), (b != a).then_some(b), (c != a && c != b).then_some(c)].into_iter().flatten()
-        };
-        // First the place where each run's triangles begin, then the triangles.
-        let mut ends = vec![0_usize; runs + 1];
-        mesh.triangles.iter().flat_map(runs_of).for_each(|run| ends[run as usize + 1] += 1);
-        (0..runs).for_each(|run| ends[run + 1] += ends[run]);
-        let mut members = vec![[0_u32; 3]; ends[runs]];
-        let mut next = ends.clone();
+        let mut members = vec![Vec::new(); runs];
         for triangle in &mesh.triangles {
-            for run in runs_of(triangle) {
-                members[next[run as usize]] = *triangle;
-                next[run as usize] += 1;
+            let [a, b, c] = triangle.map(|v| run_of[v as usize] as usize);
+            members[a].push(*triangle);
+            if b != a {
+                members[b].push(*triangle);
+            }
+            if c != a && c != b {
+                members[c].push(*triangle);
             }
         }
-        let mut faces: Vec<TriangleRun> =
-            (0..runs).into_par_iter().map(|run| Self::of(mesh, &members[ends[run]..ends[run + 1]])).collect();
+        let mut faces: Vec<TriangleRun> = members.par_iter().map(|triangles| Self::of(mesh, triangles)).collect();
         for v in Grid::find(mesh).iter().flat_map(Grid::rim) {
             faces[run_of[v as usize] as usize].rim = true;
         }

@@ -1,15 +1,7 @@
 //! What decides a bake: its options, and the header of the field, which follows from the options and a mesh.
 //!
-//! `--quality` names options in one word:
-//!
-//! | quality | lattice | face | bands | format |
-//! |---|---|---|---|---|
-//! | draft | cube:8x5,edges=auto | 32 px | 3 | f16 |
-//! | normal | cube:20x7,edges=auto | 64 px | 4 | f16 |
-//! | high | cube:24x9,edges=auto | 128 px | 5 | f16 |
-//!
-//! Times, bytes and errors are in `docs/measured.md`. More samples do not help small lights in bands: the number
-//! of bands limits them.
+//! `--quality` names them in one word ([`Quality`]); times, bytes and errors are in `docs/measured.md`. More samples do
+//! not help small lights in bands: the number of bands limits them.
 
 use super::levels;
 use super::silhouette::SilhouetteOptions;
@@ -137,7 +129,7 @@ pub fn header(mesh: &Mesh, kind: FieldKind, options: &Options) -> FieldHeader {
     }
 }
 
-/// Rows of the table.
+/// Lattice, faces and bands in one word.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
 pub enum Quality {

@@ -1,33 +1,24 @@
 //! What a frame leaves out: one row a skip, and the thresholds.
 //!
+//! Most skips change no number: what they leave out contributes exactly zero, was computed before or is not seen.
+//! `horizon`, `cones`, `caps` and `static` change numbers a little. `horizon` and `cones` follow from true visibility, which
+//! makes what they leave out zero; the band-limited product is not zero there, so each fades out over [`SKIP_FADE_RAD`]
+//! beyond its threshold.
+//!
 //! A new skip touches this table, the shader that its row names, and a test. Some skips have no switch: lights whose
 //! radiance field is zero on the side of a cluster, entities whose field holds nothing but zeros, fields that no
 //! receiver sees, and what is bounded below `--eps`.
-
-/// What a skip does to the numbers.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum SkipKind {
-    /// It changes no number: what it leaves out contributes exactly zero.
-    Exact,
-    /// It changes numbers a little. `horizon` and `cones` follow from true visibility, which makes what they leave out
-    /// zero; the band-limited product is not zero there, so each fades out over [`SKIP_FADE_RAD`] beyond its threshold.
-    Approximate,
-    /// It keeps what an earlier frame computed, or leaves for later what nobody sees: what is shown changes by no
-    /// number.
-    Incremental,
-}
 
 #[derive(Clone, Copy, Debug)]
 pub struct SkipRow {
     /// Name on the command line.
     pub name: &'static str,
-    pub kind: SkipKind,
     /// The macro of the merge shader, where that decides it too, vertex by vertex.
     pub glsl: Option<&'static str>,
 }
 
 macro_rules! skips {
-    ($($(#[$doc:meta])* $name:ident $text:literal: $kind:ident, $glsl:expr;)*) => {
+    ($($(#[$doc:meta])* $name:ident $text:literal: $glsl:expr;)*) => {
         /// The skips that a user can switch, each on or off.
         #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, serde::Serialize, serde::Deserialize)]
         pub struct Skip { $($(#[$doc])* pub $name: bool,)* }
@@ -51,32 +42,32 @@ macro_rules! skips {
         }
 
         pub const TABLE: &[SkipRow] = &[
-            $(SkipRow { name: $text, kind: SkipKind::$kind, glsl: $glsl },)*
+            $(SkipRow { name: $text, glsl: $glsl },)*
         ];
     };
 }
 
 skips! {
     /// Lights and occluders whose bounding spheres lie below the horizon of the receiving surface.
-    horizon "horizon": Approximate, Some("SKIP_HORIZON");
+    horizon "horizon": Some("SKIP_HORIZON");
     /// Occluders whose bounding spheres do not reach into a light's, as seen from the vertex.
-    cones "cones": Approximate, Some("SKIP_CONES");
+    cones "cones": Some("SKIP_CONES");
     /// Occluders that are farther than the light from a whole cluster of vertices.
-    behind "behind": Exact, None;
+    behind "behind": None;
     /// The fields of occluders that are small as seen from a vertex: what they block is taken at one direction
     /// ([`CAP_SINES`]), with the solid angle that a fit of the field's outermost shell has for it
     /// ([`crate::field::Area`]).
-    caps "caps": Approximate, Some("SKIP_CAPS");
+    caps "caps": Some("SKIP_CAPS");
     /// Occluders that every ray from a cluster to a sharp light passes by.
-    passed "passed": Exact, None;
+    passed "passed": None;
     /// Sharp lights of which one occluder covers all from a whole cluster.
-    covered "covered": Exact, None;
+    covered "covered": None;
     /// Occluders that never move against the receiver: its own visibility has their shadows, exactly where they touch.
-    grouped "static": Approximate, None;
+    grouped "static": None;
     /// Clusters of vertices for which nothing has changed since they were last merged.
-    unmoved "unmoved": Incremental, None;
+    unmoved "unmoved": None;
     /// Clusters that the camera cannot see, in pictures of a moving scene, and triangles that it cannot see.
-    hidden "hidden": Incremental, None;
+    hidden "hidden": None;
 }
 
 impl Skip {

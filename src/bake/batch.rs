@@ -7,7 +7,6 @@ use super::project::{Project, SampleFaces};
 use super::samples::Sample;
 use crate::error::Result;
 use crate::field::FieldHeader;
-use crate::gpu::memory::TexelView;
 use crate::gpu::{Access, Buffer, BufferKind, Commands, Device};
 use crate::shaders::Library;
 use glam::Vec3;
@@ -60,9 +59,8 @@ impl Batches {
         let faces: Vec<SampleFaces> =
             samples.iter().zip(slots).map(|(sample, slots)| SampleFaces::new(sample, *slots)).collect();
         self.samples.write(0, &faces);
-        let texels = self.project.texel_view()?;
         let mut commands = Commands::new(self.samples.device(), "bake batch")?;
-        self.record(&mut commands, drawn, samples.len() as u32, &texels)?;
+        self.record(&mut commands, drawn, samples.len() as u32)?;
         report.add(&commands.submit()?);
         report.faces += slots.iter().flatten().filter(|slot| **slot != NO_SLOT).count() as u32;
         report.triangles += drawn.triangles();
@@ -70,16 +68,10 @@ impl Batches {
     }
 
     /// Records one batch: captures its faces, projects them, and copies the coefficients to the host.
-    fn record<'r>(
-        &'r self,
-        commands: &mut Commands<'r>,
-        drawn: &'r Drawn,
-        sample_count: u32,
-        texels: &'r TexelView<'r>,
-    ) -> Result<()> {
+    fn record<'r>(&'r self, commands: &mut Commands<'r>, drawn: &'r Drawn, sample_count: u32) -> Result<()> {
         let Batches { capture, samples, project, coefficients, .. } = self;
         capture.record(commands, drawn, Access::ComputeSampled)?;
-        commands.pass("project", |c| project.record(c, &capture.atlas, samples, texels, coefficients, sample_count))?;
+        commands.pass("project", |c| project.record(c, &capture.atlas, samples, coefficients, sample_count))?;
         commands.barrier(Access::ComputeWrite, Access::TransferRead);
         let bytes = 4 * u64::from(sample_count) * self.stride as u64;
         commands.copy_range(coefficients, 0..bytes, &self.results, 0);

@@ -153,7 +153,7 @@ impl Quality {
                 lattice: lattice("cube:8x5,edges=auto"),
                 face_px: 32,
                 bands: 3,
-                silhouette: silhouettes(4),
+                silhouette: SilhouetteOptions { cells: 4, ..normal.silhouette },
                 vertices: 10_000,
                 ..normal
             },
@@ -162,16 +162,10 @@ impl Quality {
                 lattice: lattice("cube:24x9,edges=auto"),
                 face_px: 128,
                 bands: 5,
-                silhouette: silhouettes(16),
+                silhouette: SilhouetteOptions { cells: 16, ..normal.silhouette },
                 vertices: 200_000,
                 ..normal
             },
         }
     }
-}
-
-/// 98, 389 and 1 542 KiB of silhouettes a mesh with 4, 8 and 16 cells along a cube's face, and half as much again for a
-/// mesh that is not convex.
-fn silhouettes(cells: u32) -> SilhouetteOptions {
-    SilhouetteOptions { cells, ..Default::default() }
 }

@@ -88,11 +88,6 @@ impl Project {
         Ok(Project { pipeline, texels, bands, kind, face_px, columns })
     }
 
-    /// The view of the texel table that [`Project::record`] wants.
-    pub fn texel_view(&self) -> Result<TexelView<'_>> {
-        TexelView::new(&self.texels, TEXEL_FORMAT)
-    }
-
     /// Room for `count` samples that the host writes.
     pub fn sample_buffer(device: &Arc<Device>, count: u32) -> Result<Buffer> {
         let bytes = u64::from(count) * size_of::<SampleFaces>() as u64;
@@ -104,12 +99,12 @@ impl Project {
         commands: &mut Commands<'r>,
         atlas: &'r Image,
         samples: &'r Buffer,
-        texels: &'r TexelView<'r>,
         coefficients: &'r Buffer,
         sample_count: u32,
     ) -> Result<()> {
         let push = Push { face_px: self.face_px, atlas_columns: self.columns };
-        let resources = [Bind::Image(atlas), Bind::Buffer(samples), Bind::Texel(*texels), Bind::Buffer(coefficients)];
+        let texels = TexelView::new(&self.texels, TEXEL_FORMAT)?;
+        let resources = [Bind::Image(atlas), Bind::Buffer(samples), Bind::Texel(texels), Bind::Buffer(coefficients)];
         commands.dispatch(&self.pipeline, &resources, &push, [sample_count * self.pipeline.local_size[0], 1, 1])
     }
 }

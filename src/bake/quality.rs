@@ -87,7 +87,7 @@ mod tests {
         assert_eq!(all[1], parsed(&[]), "normal is what there is without the option");
         assert_eq!("cube:20x7,edges=auto".parse(), Ok(Lattice::default()), "as help texts write it");
         for pair in all.windows(2) {
-            let samples = pair.iter().map(|o| o.lattice.starting_at(1.0).stored_count()).collect::<Vec<_>>();
+            let samples = pair.iter().map(|o| o.lattice.stored_count()).collect::<Vec<_>>();
             assert!(pair[0].face_px < pair[1].face_px && pair[0].bands < pair[1].bands && samples[0] < samples[1]);
         }
     }

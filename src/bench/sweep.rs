@@ -201,7 +201,7 @@ mod tests {
             let all = variations(quick);
             assert_eq!(all[0].axis, "default");
             for variation in &all[1..] {
-                variation.options.bake.lattice.starting_at(0.5).validate().unwrap();
+                variation.options.bake.lattice.validate().unwrap();
                 assert_ne!(
                     format!("{:?}", variation.options),
                     format!("{:?}", all[0].options),

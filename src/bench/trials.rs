@@ -221,7 +221,7 @@ fn spoil(mesh: &mut Mesh) {
 
 /// Small patches around one ball, one at every kind of place that a lookup treats in a way of its own.
 fn marks() -> Result<Scene> {
-    let lattice = Lattice::default().starting_at(crate::field::lattice::OUTSIDE_INNER);
+    let lattice = Lattice { inner: crate::field::lattice::OUTSIDE_INNER, ..Lattice::default() };
     let directions =
         [DVec3::X, DVec3::NEG_Y, DVec3::new(1.0, 1.0, 0.0), DVec3::new(-1.0, 1.0, 1.0), DVec3::new(0.3, 0.2, -1.0)];
     let distances = [0.0, 1e-4, 0.5, lattice.shell(0), lattice.shell(5), lattice.outer, 1e6];

@@ -76,11 +76,10 @@ impl<'b> Content<'b> {
         let count = samples.len() as u32;
         let mut uploaded = Project::sample_buffer(device, count)?;
         uploaded.write(0, samples);
-        let texels = project.texel_view()?;
         let mut commands = Commands::new(device, "check of captured faces")?;
         self.capture.record(&mut commands, &self.drawn, Access::ComputeSampled)?;
         let atlas = &self.capture.atlas;
-        commands.pass("project", |c| project.record(c, atlas, &uploaded, &texels, &coefficients, count))?;
+        commands.pass("project", |c| project.record(c, atlas, &uploaded, &coefficients, count))?;
         commands.submit()?;
         coefficients.download(samples.len() * stride)
     }

@@ -69,7 +69,7 @@ impl Default for Lattice {
     }
 }
 
-/// Value of [`Lattice::inner`] that leaves the choice to the bake (see [`Lattice::starting_at`]).
+/// Value of [`Lattice::inner`] that leaves the choice to the bake (see [`Lattice::fitted`]).
 pub const AUTOMATIC: f64 = 0.0;
 /// First shell of an object that fills its bounding sphere. It lies just off the surface, so that no sample grazes it.
 pub const OUTSIDE_INNER: f64 = 1.02;
@@ -130,14 +130,6 @@ impl Lattice {
     /// Coordinate in which shells are equally spaced, of a distance of at least `inner`.
     pub fn coordinate(&self, d: f64) -> f64 {
         chord(self.reach(d))
-    }
-
-    /// This lattice with its first shell at `inner` (in r), unless it was chosen before.
-    pub fn starting_at(mut self, inner: f64) -> Self {
-        if self.inner == AUTOMATIC {
-            self.inner = inner;
-        }
-        self
     }
 
     /// This lattice around an object. A fit and a first shell that were chosen before stay. Otherwise the lattice takes

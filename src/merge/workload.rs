@@ -39,7 +39,7 @@ impl Workload {
     /// occluders of 1 m radius with fields of default shape, f16 and 4 bands.
     pub fn new(device: &Arc<Device>, vertex_count: u32, occluder_count: u32) -> Result<Self> {
         let vertex_count = vertex_count.next_multiple_of(CLUSTER_VERTICES);
-        let lattice = Lattice::default().starting_at(1.0);
+        let lattice = Lattice { inner: 1.0, ..Lattice::default() };
         let shift = lattice.packed();
         let (slope, offset) = lattice.radial_map();
         let entity_limit = uniform_entities(device);

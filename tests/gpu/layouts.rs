@@ -36,7 +36,7 @@ fn merge() -> Vec<(Variant, Reflection)> {
         bands: 4,
         field_bands: 4,
         storage: Storage::F16,
-        lattice: Lattice::default().starting_at(1.02),
+        lattice: Lattice { inner: 1.02, ..Lattice::default() },
         skip: Skip::ALL,
         lights: true,
         sheets: true,

@@ -8,6 +8,9 @@ use crate::error::{Error, Result};
 use glam::Vec3;
 use serde::{Deserialize, Serialize};
 
+/// Most that lengths of one mesh may differ by, so that f32 positions still keep its vertices apart.
+const LENGTH_RATIO: f32 = 1e6;
+
 /// A generated mesh as a scene file names it: a table with one key, for example `sphere = { radius_m = 0.5,
 /// subdivisions = 3 }`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -107,6 +110,10 @@ impl Generator {
         };
         if lengths.iter().any(|l| !(1e-7..=COORDINATE_LIMIT_M / 2.0).contains(l)) {
             return Err(Error::Input(format!("a length is not within 1e-7 to {:e} m", COORDINATE_LIMIT_M / 2.0)));
+        }
+        let longest = lengths.iter().copied().fold(0.0, f32::max);
+        if lengths.iter().any(|l| longest > LENGTH_RATIO * l) {
+            return Err(Error::Input(format!("lengths differ by more than a factor of {LENGTH_RATIO:e}")));
         }
         if counts.contains(&0) {
             return Err(Error::Input("a count of cells or subdivisions is zero".into()));

@@ -187,6 +187,7 @@ fn scene_meshes_and_environment() {
         ("[[mesh]]\nname = \"m\"\nplane = { size_m = 1, cells = -1 }\n", "invalid value"),
         ("[[mesh]]\nname = \"m\"\nplane = { size_m = 1, cells = 100000 }\n", "limit of 4000000"),
         ("[[mesh]]\nname = \"m\"\nplane = { size_m = inf, cells = 1 }\n", "a length is not within"),
+        ("[[mesh]]\nname = \"m\"\ncuboid = { size_m = [1e-7, 1e-7, 5e6], cells = 1 }\n", "lengths differ by more than"),
         ("[[mesh]]\nname = \"m\"\ncuboid = { size_m = [1, 1], cells = 1 }\n", "invalid length 2"),
         ("[[mesh]]\nname = \"m\"\nfile = \"none.obj\"\n", "none.obj: no such file"),
         ("[[mesh]]\nname = \"m\"\nfile = \"bad.obj\"\n", "bad.obj:2: position index 2 is out of range"),

@@ -44,15 +44,16 @@ const TOWARD: [f64; 3] = [0.5, 0.707, 0.5];
 const GAP: f64 = 0.02;
 /// Distance of the sphere lights from the teapot's centre, in bounding radii.
 const DISTANCE: f64 = 5.0;
-/// The items whose names contain one of the texts, in their order. Without texts all items are returned.
-pub fn named<T>(mut all: Vec<T>, texts: &[String], name: impl Fn(&T) -> &str) -> Result<Vec<T>> {
+
+/// The cases whose names contain one of the texts, in their order. Without texts all cases are returned.
+pub fn named(mut all: Vec<Case>, texts: &[String]) -> Result<Vec<Case>> {
     for text in texts {
-        if !all.iter().any(|case| name(case).contains(text)) {
-            let names: Vec<&str> = all.iter().map(&name).collect();
+        if !all.iter().any(|case| case.name.contains(text)) {
+            let names: Vec<&str> = all.iter().map(|case| case.name.as_str()).collect();
             return Err(Error::Usage(format!("no case has \"{text}\" in its name ({})", names.join("; "))));
         }
     }
-    all.retain(|case| texts.is_empty() || texts.iter().any(|text| name(case).contains(text)));
+    all.retain(|case| texts.is_empty() || texts.iter().any(|text| case.name.contains(text)));
     Ok(all)
 }
 

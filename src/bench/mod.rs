@@ -4,7 +4,6 @@
 // Fields of rows of results are keys of CSV and JSON; what their names say needs no comment.
 #![allow(missing_docs)]
 
-pub mod bake_skips;
 pub mod budget;
 pub mod cases;
 pub mod ceilings;

@@ -97,7 +97,7 @@ fn chosen(quick: bool, names: &[String]) -> Result<Vec<Case>> {
             ["sphere_over_plane", "torus_over_plane"].contains(&case.name.as_str()) || case.name.contains("(b)")
         });
     }
-    cases::named(all, names, |case| &case.name)
+    cases::named(all, names)
 }
 
 /// The default, and the settings of the named axes, or of all axes.

@@ -1,8 +1,8 @@
-//! `shadow-fields bench skip` measures what each skip saves, in frames and in bakes.
+//! `shadow-fields bench skip` measures what each skip saves.
 
 use super::common::{start, table};
 use crate::app::{Global, output};
-use crate::bench::{bake_skips, cases, skips};
+use crate::bench::{cases, skips};
 use crate::error::Result;
 use clap::Args;
 use std::path::PathBuf;
@@ -13,30 +13,21 @@ pub struct Arguments {
     /// A minute on two cores instead of five: two scenes, fewer rays and rounds
     #[arg(long)]
     quick: bool,
-    /// Measure only scenes and meshes that have TEXT in their names; may be given again; a text that none has lists
-    /// them
+    /// Measure only scenes that have TEXT in their names; may be given again; a text that none has lists them
     #[arg(long, value_name = "TEXT")]
     case: Vec<String>,
-    /// Folder for skip.csv and skip.json, and of bakes skip_bake.csv and skip_bake.json
+    /// Folder for skip.csv and skip.json
     #[arg(short, long = "output", alias = "out", value_name = "DIR")]
     out: PathBuf,
 }
 
 /// Measures and prints a row a scene and skip.
 pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
-    let mut scenes = skips::all(arguments.quick)?;
-    let mut meshes = bake_skips::meshes(arguments.quick);
-    let names = scenes.iter().map(|case| &case.name).chain(meshes.iter().map(|mesh| &mesh.name));
-    let mut names: Vec<String> = names.cloned().collect();
-    names.dedup();
-    let names = cases::named(names, &arguments.case, String::as_str)?;
-    scenes.retain(|case| names.contains(&case.name));
-    meshes.retain(|mesh| names.contains(&mesh.name));
-    let (context, (rows, bakes)) = start(global, arguments.quick, &arguments.out, |bench| {
-        Ok((skips::run(bench, &arguments.out, &scenes)?, bake_skips::run(bench, &arguments.out, &meshes)?))
-    })?;
+    let scenes = cases::named(skips::all(arguments.quick)?, &arguments.case)?;
+    let (context, rows) =
+        start(global, arguments.quick, &arguments.out, |bench| skips::run(bench, &arguments.out, &scenes))?;
     if global.json {
-        output::say(serde_json::json!({ "frames": rows, "bakes": bakes }).to_string());
+        output::say(serde_json::json!({ "frames": rows }).to_string());
         return context.finish();
     }
     output::say(
@@ -57,24 +48,5 @@ pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
         ("most change", "/change/max_relative"),
     ];
     table(&rows, &columns);
-    output::say(
-        "\nBakes without any shortcut (off) and with this one (on); errors are against a field of faces of 128 px. Filled: samples inside \
-         the solid,\ncaptured at its surface or filled from neighbours.",
-    );
-    let columns = [
-        ("mesh", "/case"),
-        ("triangles", "/triangle_count"),
-        ("skip", "/skip"),
-        ("off ms", "/off/bake_ms"),
-        ("on ms", "/on/bake_ms"),
-        ("times faster", "/speed_up_ratio"),
-        ("captured", "/on/captured_count"),
-        ("filled", "/on/filled_count"),
-        ("off faces", "/off/face_count"),
-        ("on faces", "/on/face_count"),
-        ("off error", "/off/error"),
-        ("on error", "/on/error"),
-    ];
-    table(&bakes, &columns);
     context.finish()
 }

@@ -1,7 +1,7 @@
 #version 460
 #extension GL_EXT_control_flow_attributes : require
 // Measures a device's peak rates, one kind of work per compilation. KIND 0: multiply-adds, 1 texels of four halves, 2
-// texels of 16 bytes, 3 reads of 8 bytes from a storage block, 4 triad.
+// texels of 16 bytes and 3 reads of 8 bytes from a storage block.
 layout(local_size_x = 64) in;
 layout(std430, binding = 1) buffer Out { vec4 results[]; };
 
@@ -14,16 +14,10 @@ layout(binding = 0) uniform utextureBuffer source;
 #elif KIND == 3
 layout(std430, binding = 0) readonly buffer Source { uvec2 source[]; };
 #define READ(i) vec4(source[i].xyxy)
-#elif KIND == 4
-layout(std430, binding = 0) readonly buffer Source { vec4 source[]; };
-layout(std430, binding = 2) readonly buffer Other { vec4 other[]; };
 #endif
 
 void main() {
     uint index = gl_GlobalInvocationID.x;
-#if KIND == 4
-    results[index] = source[index] + 0.5 * other[index];
-#else
     // Sixteen independent results, so that latency is hidden.
     vec4 sums[4] = vec4[](vec4(index), vec4(0.25), vec4(0.5), vec4(0.75));
     uint at = index * 747796405u;
@@ -46,5 +40,4 @@ void main() {
 #endif
     } while (++round < ROUNDS);
     results[index] = sums[0] + sums[1] + sums[2] + sums[3];
-#endif
 }

@@ -18,8 +18,6 @@ pub struct Ceilings {
     pub texel_packed_giga: f64,
     /// Reads of 8 bytes from a storage block of the field's size, in 10^9 a second.
     pub storage_giga: f64,
-    /// Bytes that `a = b + s c` reads and writes in buffers larger than caches, in 10^9 a second.
-    pub triad_gb_s: f64,
     /// Time of a dispatch of one workgroup with almost no work, milliseconds: the resolution of all times.
     pub dispatch_ms: f64,
 }
@@ -35,66 +33,41 @@ impl Ceilings {
 const RUNS: usize = 5;
 /// Vector multiply-adds, or reads, per iteration.
 const READS: u32 = 16;
-/// Floats of each of the triad's three buffers: 16 MiB.
-const TRIAD_FLOATS: u32 = 4 << 20;
+/// Invocations of the arithmetic, the most of any kind: each writes 16 bytes.
+const ARITHMETIC_INVOCATIONS: u32 = 65_536;
 
 /// Measures a device with reads from a buffer of `field_bytes`.
 pub fn measure(device: &Arc<Device>, library: &Library, field_bytes: u64) -> Result<Ceilings> {
     let source = Buffer::with_data(device, "ceiling source", &vec![0x2000_2000_u32; field_bytes as usize / 4])?;
-    let out = Buffer::new(device, "ceiling results", BufferKind::Device, 4 * u64::from(TRIAD_FLOATS))?;
-    // Invocations per run differ by kind, because some kinds are slow on a CPU.
-    let rate = |kind: u32, invocations: u32, rounds: u32, texel_bytes: u64| -> Result<f64> {
-        let count = (field_bytes / texel_bytes).max(8) as u32;
-        let mask = count.next_power_of_two() / if count.is_power_of_two() { 1 } else { 2 } - 1;
+    let out = Buffer::new(device, "ceiling results", BufferKind::Device, 16 * u64::from(ARITHMETIC_INVOCATIONS))?;
+    let seconds = |kind: u32, invocations: u32, rounds: u32, texel_bytes: u64| -> Result<f64> {
+        let texels = (field_bytes / texel_bytes).max(8);
         let row = ShaderPermutation::new("ceiling.comp", 4)
             .define("KIND", kind)
             .define("READS", READS)
             .define("ROUNDS", rounds)
-            .define("MASK", mask);
+            .define("MASK", (1_u32 << texels.ilog2()) - 1);
         let pipeline = ComputePipeline::new(device, "ceiling", &library.shader(&row)?)?;
-        let view = match kind {
-            1 => Some(TexelView::new(&source, vk::Format::R16G16B16A16_SFLOAT)?),
-            2 => Some(TexelView::new(&source, vk::Format::R32G32B32A32_UINT)?),
-            _ => None,
+        let first = match kind {
+            1 => Bind::Texel(TexelView::new(&source, vk::Format::R16G16B16A16_SFLOAT)?),
+            2 => Bind::Texel(TexelView::new(&source, vk::Format::R32G32B32A32_UINT)?),
+            _ => Bind::Buffer(&source),
         };
-        let first = match view {
-            Some(view) => Bind::Texel(view),
-            None => Bind::Buffer(&source),
-        };
-        let seconds = best(device, &pipeline, &[first, Bind::Buffer(&out)], invocations)?;
-        Ok(f64::from(invocations) * f64::from(rounds) * f64::from(READS) / seconds * 1e-9)
+        best(device, &pipeline, &[first, Bind::Buffer(&out)], invocations)
     };
+    let rate = |kind: u32, invocations: u32, rounds: u32, texel_bytes: u64| -> Result<f64> {
+        let reads = f64::from(invocations) * f64::from(rounds) * f64::from(READS);
+        Ok(1e-9 * reads / seconds(kind, invocations, rounds, texel_bytes)?)
+    };
+    // Invocations differ by kind, because some kinds are slow on a CPU.
     Ok(Ceilings {
         // An iteration multiplies and adds vectors of four.
-        gflops: 8.0 * rate(0, 65_536, 256, 8)?,
+        gflops: 8.0 * rate(0, ARITHMETIC_INVOCATIONS, 256, 8)?,
         texel_halves_giga: rate(1, 16_384, 64, 8)?,
         texel_packed_giga: rate(2, 16_384, 64, 16)?,
         storage_giga: rate(3, 16_384, 16, 8)?,
-        triad_gb_s: triad(device, library, &out)?,
-        dispatch_ms: idle(device, library, &source, &out)?,
+        dispatch_ms: 1e3 * seconds(0, 1, 1, 8)?,
     })
-}
-
-fn triad(device: &Arc<Device>, library: &Library, out: &Buffer) -> Result<f64> {
-    let bytes = 4 * u64::from(TRIAD_FLOATS);
-    let ones = vec![1.0_f32; TRIAD_FLOATS as usize];
-    let b = Buffer::with_data(device, "ceiling b", &ones)?;
-    let c = Buffer::with_data(device, "ceiling c", &ones)?;
-    let row = ShaderPermutation::new("ceiling.comp", 4).define("KIND", 4_u32);
-    let pipeline = ComputePipeline::new(device, "ceiling", &library.shader(&row)?)?;
-    let resources = [Bind::Buffer(&b), Bind::Buffer(out), Bind::Buffer(&c)];
-    Ok(3.0 * bytes as f64 / best(device, &pipeline, &resources, TRIAD_FLOATS / 4)? * 1e-9)
-}
-
-/// Milliseconds of a dispatch of one workgroup with one iteration of multiply-adds.
-fn idle(device: &Arc<Device>, library: &Library, source: &Buffer, out: &Buffer) -> Result<f64> {
-    let row = ShaderPermutation::new("ceiling.comp", 4)
-        .define("KIND", 0_u32)
-        .define("READS", 1_u32)
-        .define("ROUNDS", 1_u32)
-        .define("MASK", 7_u32);
-    let pipeline = ComputePipeline::new(device, "ceiling", &library.shader(&row)?)?;
-    Ok(1e3 * best(device, &pipeline, &[Bind::Buffer(source), Bind::Buffer(out)], 1)?)
 }
 
 /// Seconds of the fastest run, because noise only adds time.

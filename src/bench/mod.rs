@@ -49,18 +49,6 @@ pub struct Bench<'b> {
 }
 
 impl Bench<'_> {
-    /// Times of one pass in frames of a scene that moves, milliseconds, all light made anew in each; none where the
-    /// frame has no such pass. The first frame is not timed.
-    pub fn pass_times(&self, scene: &Scene, options: frame::Options, pass: &str, runs: u32) -> Result<Vec<f64>> {
-        let mut frame = self.frame(scene, options)?;
-        let mut times = Vec::new();
-        for run in 0..=runs {
-            let passes = frame.render(&scene.at(f64::from(run) / 30.0), None)?;
-            times.extend(passes.iter().filter(|timed| run > 0 && timed.pass == pass).map(|timed| timed.milliseconds));
-        }
-        Ok(times)
-    }
-
     pub fn frame(&self, scene: &Scene, options: frame::Options) -> Result<Frame> {
         Frame::new(self.baker, self.cache, scene, options, &|what, done, all| {
             if done == all {

@@ -26,10 +26,6 @@ fn a_round_of_a_loop_is_counted() {
     let census = ceiling(3);
     assert_eq!(census.fetch_count(), 0);
     assert_eq!(census.block_bytes.values().sum::<u32>(), 16 * 8);
-    // Without a loop the whole shader counts: two vectors of four read, one scaled, one added.
-    let census = ceiling(4);
-    assert_eq!(census.block_bytes.values().sum::<u32>(), 32);
-    assert_eq!(census.flops, 8);
 }
 
 fn profile(folder: &Folder, line: &str) -> Value {
@@ -50,7 +46,7 @@ fn two_variants_side_by_side() {
     let document = profile(&folder, line);
     positive(
         &document["ceilings"],
-        &["/gflops", "/texel_halves_giga", "/texel_packed_giga", "/storage_giga", "/triad_gb_s", "/dispatch_ms"],
+        &["/gflops", "/texel_halves_giga", "/texel_packed_giga", "/storage_giga", "/dispatch_ms"],
     );
     let rows = document["passes"].as_array().unwrap();
     assert_eq!(rows.len(), 2);

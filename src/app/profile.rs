@@ -1,6 +1,6 @@
 //! `shadow-fields profile` times every pass and every variant of the merge shader.
 
-use super::bench::common::{bench, table};
+use super::bench::{bench, table};
 use super::context::Context;
 use super::{Global, output, outputs};
 use crate::bench::ceilings;

@@ -1,0 +1,299 @@
+//! `shadow-fields bench`: the measurements behind the documentation's figures.
+
+use super::context::Context;
+use super::source::GltfSceneArguments;
+use super::{Global, output, outputs};
+use crate::bench::cases::{self, Case};
+use crate::bench::stability::{self, NEAR_F16, NEAR_F32, StabilityOutcome};
+use crate::bench::time_error::{self, Selection, TimeErrorOutcome};
+use crate::bench::trials::NEAR_TWIN;
+use crate::bench::{Bench, scaling, skips};
+use crate::error::{Error, Result};
+use crate::scene;
+use crate::text::three;
+use crate::truth::exposure;
+use clap::{Args, Subcommand};
+use serde::Serialize;
+use serde_json::{Value, json};
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+/// Arguments of `bench`.
+#[derive(Args)]
+pub struct Arguments {
+    #[command(subcommand)]
+    what: What,
+}
+
+#[derive(Subcommand)]
+enum What {
+    /// Split the error of pictures into its causes, sweep the settings, and compare with ray casting and shadow maps
+    #[command(
+        after_help = "Examples:\n  shadow-fields bench time-error --quick --output out/errors\n  shadow-fields bench time-error my_scene.toml \
+        --axis lattice --output out/my_scene\n  shadow-fields bench time-error --case torus --axis lattice --output out/torus"
+    )]
+    TimeError {
+        /// Scene file or glTF file to measure and sweep instead of the built-in cases, at the time_s of its [output]
+        #[arg(value_name = "SCENE", conflicts_with = "case")]
+        scene: Option<PathBuf>,
+        /// Measure and sweep only cases that have TEXT in their names; may be given again; a text that none has lists
+        /// them
+        #[arg(long, value_name = "TEXT")]
+        case: Vec<String>,
+        /// Sweep only this axis, with all its settings (each may need bakes of its own); may be given again; an unknown
+        /// name lists them
+        #[arg(long, value_name = "NAME")]
+        axis: Vec<String>,
+        #[command(flatten)]
+        gltf: GltfSceneArguments,
+        #[command(flatten)]
+        run: RunArguments,
+    },
+    /// Test the merge with long chains, extreme places and extreme numbers; exit code 1 where a trial fails
+    Stability(RunArguments),
+    /// Measure what each skip saves and how it changes the error
+    Skip {
+        /// Measure only scenes that have TEXT in their names; may be given again; a text that none has lists them
+        #[arg(long, value_name = "TEXT")]
+        case: Vec<String>,
+        #[command(flatten)]
+        run: RunArguments,
+    },
+    /// Measure time and memory for growing numbers of vertices, entities and lights
+    Scaling {
+        /// Measure only this axis; may be given again; an unknown name lists them
+        #[arg(long, value_name = "NAME")]
+        axis: Vec<String>,
+        #[command(flatten)]
+        run: RunArguments,
+    },
+}
+
+#[derive(Args)]
+struct RunArguments {
+    /// A minute on two cores instead of five, or a quarter of an hour for time-error: fewer and smaller scenes, settings
+    /// and rays
+    #[arg(long)]
+    quick: bool,
+    /// Folder for the results as CSV and JSON, and for pictures
+    #[arg(short, long = "output", alias = "out", value_name = "DIR")]
+    out: PathBuf,
+}
+
+/// Runs a measurement.
+pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
+    match &arguments.what {
+        What::TimeError { scene, case, axis, gltf, run } => {
+            let own = scene.as_deref().map(|path| own_case(global, gltf, path)).transpose()?;
+            let inputs: Vec<PathBuf> = scene.iter().flat_map(|path| scene::files::of_scene(path)).collect();
+            let selection = Selection { scene: scene.clone(), cases: case.clone(), axes: axis.clone() };
+            let measured = |bench: &Bench<'_>| time_error::run(bench, &run.out, &selection, own);
+            measure(global, run, &inputs, measured, |outcome| print_time_error(&run.out, outcome))?;
+        }
+        What::Stability(run) => {
+            let outcome = measure(global, run, &[], |bench| stability::run(bench, &run.out), print_stability)?;
+            let [failed, all] = outcome.failed();
+            if failed > 0 {
+                return Err(Error::Failed(format!("{failed} of {all} trials failed")));
+            }
+        }
+        What::Skip { case, run } => {
+            let scenes = cases::named(skips::all(run.quick)?, case)?;
+            measure(global, run, &[], |bench| skips::run(bench, &run.out, &scenes), |rows| print_skips(rows))?;
+        }
+        What::Scaling { axis, run } => {
+            measure(global, run, &[], |bench| scaling::run(bench, &run.out, axis), |points| print_scaling(points))?;
+        }
+    }
+    Ok(())
+}
+
+/// Opens the device, measures with progress on stderr, and prints the outcome: as JSON, or the tables that `print` makes
+/// of it. The folder of results must not hold any of the inputs.
+fn measure<T: Serialize>(
+    global: &Global,
+    run: &RunArguments,
+    inputs: &[PathBuf],
+    measured: impl FnOnce(&Bench<'_>) -> Result<T>,
+    print: impl FnOnce(&T),
+) -> Result<T> {
+    outputs::check_folder("--output", &run.out, inputs)?;
+    let context = Context::new(global)?;
+    let started = Instant::now();
+    let show = |what: &str| {
+        if !global.no_progress {
+            output::note(global, format!("{:6.1} s  {what}", started.elapsed().as_secs_f64()));
+        }
+    };
+    let outcome = measured(&bench(&context, global, run.quick, &show))?;
+    if global.json {
+        output::say(json!(outcome).to_string());
+    } else {
+        print(&outcome);
+    }
+    context.finish()?;
+    Ok(outcome)
+}
+
+/// The measurements' view of an open device.
+pub fn bench<'b>(context: &'b Context, global: &Global, quick: bool, progress: &'b dyn Fn(&str)) -> Bench<'b> {
+    let origin = context.origin(global);
+    Bench { baker: &context.baker, cache: &context.cache, progress, quick, seed: global.seed, origin }
+}
+
+/// The case of a scene file.
+fn own_case(global: &Global, gltf: &GltfSceneArguments, path: &Path) -> Result<Case> {
+    let mut scene = gltf.scene(global, path, 0.0)?;
+    let output = scene.data.output.clone();
+    exposure::settle(&mut scene, output.time_s, output.aspect());
+    Case::of_file(path, scene)
+}
+
+/// Prints rows of results: each column is its header and the JSON pointer of its value in a row.
+pub fn table(rows: &impl Serialize, columns: &[(&str, &str)]) {
+    let rows = json!(rows);
+    let rows = rows.as_array().map_or(&[][..], Vec::as_slice);
+    let cell = |row: &Value, pointer: &str| match row.pointer(pointer) {
+        None | Some(Value::Null) => "-".to_owned(),
+        Some(Value::Bool(yes)) => if *yes { "yes" } else { "NO" }.to_owned(),
+        Some(Value::Number(number)) if number.is_f64() => three(number.as_f64().expect("it is f64")),
+        Some(Value::String(text)) => text.clone(),
+        Some(other) => other.to_string(),
+    };
+    let cells = rows.iter().map(|row| columns.iter().map(|(_, pointer)| cell(row, pointer)).collect());
+    let header: Vec<&str> = columns.iter().map(|(name, _)| *name).collect();
+    output::table(&header, &cells.collect::<Vec<_>>());
+}
+
+fn print_time_error(out: &Path, outcome: &TimeErrorOutcome) {
+    output::say("Relative RMS error over vertices against rays from them, by cause (p99 and max of the total)");
+    let columns = [
+        ("scene", "/case"),
+        ("centre rule", "/centre_rule/rms_relative"),
+        ("bands", "/bands/rms_relative"),
+        ("sampling", "/sampling/rms_relative"),
+        ("storage", "/arithmetic_and_storage/rms_relative"),
+        ("total in SH", "/total/rms_relative"),
+        ("sharp lights", "/sharp_total/rms_relative"),
+        ("p99", "/total/p99_relative"),
+        ("max", "/total/max_relative"),
+        ("T0 error", "/t0_error_relative"),
+    ];
+    table(&outcome.budgets, &columns);
+    output::say(
+        "\nPictures: mean FLIP against rays from vertices; against rays from pixels mean FLIP and relative RMS error",
+    );
+    let columns = [
+        ("scene", "/case"),
+        ("FLIP", "/mean_flip_ratio"),
+        ("pixel FLIP", "/pixels/mean_flip_ratio"),
+        ("pixel RMS", "/pixels/rms_relative"),
+    ];
+    table(&outcome.pictures, &columns);
+    output::say(
+        "\nA frame, everything merged, against ray casting with as many threads at equal error, and the quickest shadow map that errs no \
+         more\n(at vertices without drawing, at pixels with it)",
+    );
+    let columns = [
+        ("scene", "/title"),
+        ("frame ms", "/frame_wall_ms/median"),
+        ("error", "/merge_error/rms_relative"),
+        ("rays", "/rays_at_equal_rms_count"),
+        ("rays ms", "/rival_ms_at_equal_rms"),
+        ("times faster", "/speed_up_at_equal_rms_ratio"),
+        ("merge alone", "/merge_speed_up_at_equal_rms_ratio"),
+        ("map ms", "/map_ms_at_equal_rms"),
+    ];
+    table(&outcome.comparisons, &columns);
+    if !outcome.points.is_empty() {
+        output::say("\nSettings, one at a time round the default");
+        let columns = [
+            ("scene", "/case"),
+            ("axis", "/axis"),
+            ("setting", "/name"),
+            ("merge ms", "/merge_ms/median"),
+            ("over default", "/time_per_default_ratio"),
+            ("error", "/total/rms_relative"),
+            ("field bytes", "/field_bytes"),
+        ];
+        table(&outcome.points, &columns);
+    }
+    output::say(format!("\n{}: this run took {}", output::shown(out), outcome.took()));
+}
+
+fn print_stability(outcome: &StabilityOutcome) {
+    output::say(format!(
+        "Irradiance behind chains of caps (1 where nothing blocks). A guarded chain stays from 0 to 1, in f32 within \
+         {NEAR_F32:e} of f64,\nwith factors in f16 within {NEAR_F16:e}; 5 to 7 bands of visibility are not guarded"
+    ));
+    let columns = [
+        ("caps", "/caps"),
+        ("count", "/cap_count"),
+        ("truth", "/truth_relative"),
+        ("plain", "/plain_relative"),
+        ("guarded", "/guarded_relative"),
+        ("f32", "/guarded_f32_relative"),
+        ("f16", "/guarded_f16_relative"),
+        ("5 bands", "/plain_5_bands_relative"),
+        ("6 bands", "/plain_6_bands_relative"),
+        ("7 bands", "/plain_7_bands_relative"),
+        ("passed", "/passed"),
+    ];
+    table(&outcome.chains, &columns);
+    output::say(format!(
+        "\nOdd scenes: everything finite, the same bytes when merged again, radiosity within its bound, and within {NEAR_TWIN:e} \
+         of the f64 twin"
+    ));
+    let columns = [
+        ("scene", "/name"),
+        ("fields", "/storage"),
+        ("finite", "/finite"),
+        ("repeatable", "/repeatable"),
+        ("largest", "/largest_radiosity"),
+        ("bound", "/bound_radiosity"),
+        ("against f64", "/twin_error_relative"),
+        ("passed", "/passed"),
+    ];
+    table(&outcome.trials, &columns);
+}
+
+fn print_skips(rows: &[skips::SkipCost]) {
+    output::say(
+        "Times of a frame without drawing, in turns without and with the skip (for \"hidden\" with drawing, at 1280x720). Left off: \
+         entries of\nlists (for \"hidden\": clusters). Errors and changes are relative to the RMS radiosity.",
+    );
+    let columns = [
+        ("scene", "/case"),
+        ("skip", "/skip"),
+        ("off ms", "/off/frame_ms/median"),
+        ("on ms", "/on/frame_ms/median"),
+        ("times faster", "/speed_up_ratio"),
+        ("left off", "/left_off_count"),
+        ("off lookups", "/off/entry_count"),
+        ("on lookups", "/on/entry_count"),
+        ("off error", "/off/error/rms_relative"),
+        ("on error", "/on/error/rms_relative"),
+        ("most change", "/change/max_relative"),
+    ];
+    table(&rows, &columns);
+}
+
+fn print_scaling(points: &[scaling::ScalingPoint]) {
+    output::say("Frames without drawing, in milliseconds: everything moves, one entity moves, nothing moves");
+    let columns = [
+        ("axis", "/axis"),
+        ("vertices", "/vertices"),
+        ("entities", "/entities"),
+        ("lights", "/lights"),
+        ("all move", "/all_move_ms/median"),
+        ("merge", "/merge_ms/median"),
+        ("one moves", "/one_moves_ms/median"),
+        ("at rest", "/rest_ms/median"),
+        ("ns/vertex", "/merge_ns_a_vertex"),
+        ("lookups/vertex", "/entries_a_vertex"),
+        ("error", "/error"),
+        ("device bytes", "/device_bytes"),
+        ("resident bytes", "/resident_bytes"),
+    ];
+    table(&points, &columns);
+}

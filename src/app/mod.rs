@@ -55,7 +55,7 @@ enum Subcommands {
     Import(import::Arguments),
     /// Show what is in an .sf file: header, one lookup, contact sheets
     Inspect(inspect::Arguments),
-    /// Measure error, time and stability and write tables and plots
+    /// Measure error, time and stability and write tables
     Bench(bench::Arguments),
     /// Compare every pass with its CPU twin on the chosen device; exit code 1 where one differs by more than its
     /// tolerance

@@ -11,7 +11,6 @@ pub mod figures;
 pub mod house;
 pub mod judged;
 pub mod pictures;
-pub mod plot;
 pub mod profile;
 pub mod rival;
 pub mod scaling;

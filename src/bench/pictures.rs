@@ -139,7 +139,7 @@ fn named(folder: &Path, kind: &str, case: &Case) -> std::path::PathBuf {
 }
 
 /// The name of a case, with dashes for what a file's name should not have.
-pub fn dashed(name: &str) -> String {
+fn dashed(name: &str) -> String {
     let words: Vec<&str> = name.split(|c: char| !c.is_ascii_alphanumeric()).filter(|w| !w.is_empty()).collect();
     words.join("-")
 }

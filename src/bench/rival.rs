@@ -101,7 +101,7 @@ pub struct Comparison {
 }
 
 impl Comparison {
-    /// Name of the merge in tables and plots.
+    /// Name of the merge in tables.
     pub fn merge_title(&self) -> &'static str {
         match (self.lights, self.place, self.shading) {
             (None, ..) => "merge",

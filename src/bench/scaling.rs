@@ -2,7 +2,6 @@
 
 use super::budget::device_radiosity;
 use super::figures::{Radiosity, Spread, difference, rms, spread};
-use super::plot::{self, Curve};
 use super::sweep::merge_ms;
 use super::town::{Town, moved};
 use super::{Bench, default_options};
@@ -54,8 +53,7 @@ pub struct ScalingPoint {
     pub resident_bytes: Option<u64>,
 }
 
-/// Measures the `chosen` axes (all if empty), and writes `scaling.csv`, `scaling.json` and a plot an axis into
-/// `folder`.
+/// Measures the `chosen` axes (all if empty), and writes `scaling.csv` and `scaling.json` into `folder`.
 pub fn run(bench: &Bench<'_>, folder: &Path, chosen: &[String]) -> Result<Vec<ScalingPoint>> {
     let mut axes = axes(bench.quick);
     if let Some(name) = chosen.iter().find(|name| !axes.iter().any(|(axis, _)| axis == name)) {
@@ -72,11 +70,6 @@ pub fn run(bench: &Bench<'_>, folder: &Path, chosen: &[String]) -> Result<Vec<Sc
     }
     let origin = json!({ "origin": bench.origin, "quick": bench.quick });
     write_rows(folder, "scaling", &origin, &points)?;
-    for (axis, _) in axes {
-        let of_axis: Vec<&ScalingPoint> = points.iter().filter(|p| p.axis == axis).collect();
-        let path = folder.join(format!("scaling-{}.svg", axis.replace(' ', "-")));
-        plot::write(&path, "A frame without drawing", axis, "milliseconds (median)", &curves(axis, &of_axis))?;
-    }
     Ok(points)
 }
 
@@ -180,23 +173,4 @@ fn resident_bytes() -> Option<u64> {
     let status = std::fs::read_to_string("/proc/self/status").ok()?;
     let line = status.lines().find_map(|line| line.strip_prefix("VmRSS:"))?;
     Some(line.trim().trim_end_matches(" kB").trim().parse::<u64>().ok()? * 1024)
-}
-
-/// Times against what grows along an axis.
-fn curves(axis: &str, points: &[&ScalingPoint]) -> Vec<Curve> {
-    let size = |p: &ScalingPoint| match axis {
-        "vertices" => p.vertices,
-        "lights" => p.lights,
-        _ => p.entities,
-    } as f64;
-    let curve = |label: &str, value: fn(&ScalingPoint) -> f64| Curve {
-        label: label.into(),
-        points: points.iter().map(|p| (size(p), value(p))).collect(),
-        notes: points.iter().map(|p| crate::text::three(value(p))).collect(),
-    };
-    vec![
-        curve("all move", |p| p.all_move_ms.median),
-        curve("one moves", |p| p.one_moves_ms.median),
-        curve("at rest", |p| p.rest_ms.median),
-    ]
 }

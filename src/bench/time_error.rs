@@ -2,10 +2,8 @@
 
 use super::budget::{Budget, Effort, Truth, budget};
 use super::cases::{self, Case};
-use super::pictures::{CasePicture, dashed, pictures};
-use super::plot::{self, Curve};
+use super::pictures::{CasePicture, pictures};
 use super::rival::{Comparison, compare};
-use super::shadow_map::Filter;
 use super::sweep::{Point, Variation, sweep, variations};
 use super::{Bench, default_options};
 use crate::error::{Error, Result};
@@ -48,8 +46,8 @@ impl TimeErrorOutcome {
     }
 }
 
-/// Measures, and writes into `folder`: `budget.csv`, `sweep.csv`, `rival.csv`, `time-error.json`, and three pictures
-/// and a plot a case. `own` is the case of the selected scene file.
+/// Measures, and writes into `folder`: `budget.csv`, `sweep.csv`, `rival.csv`, `time-error.json`, and three pictures a
+/// case. `own` is the case of the selected scene file.
 pub fn run(bench: &Bench<'_>, folder: &Path, selection: &Selection, own: Option<Case>) -> Result<TimeErrorOutcome> {
     let sweeps_all = own.is_some() || !selection.cases.is_empty();
     let cases = own.map_or_else(|| chosen(bench.quick, &selection.cases), |case| Ok(vec![case]))?;
@@ -130,38 +128,7 @@ fn write_all(bench: &Bench<'_>, folder: &Path, selection: &Selection, outcome: &
     let rivals: Vec<Value> = outcome.comparisons.iter().flat_map(rival_rows).collect();
     write(&folder.join("rival.csv"), &csv(&origin, &rivals))?;
     write(&folder.join("time-error.json"), &format!("{:#}\n", json!({ "origin": origin, "outcome": outcome })))?;
-    for Budget { case, .. } in &outcome.budgets {
-        let path = folder.join(format!("time-error-{}.svg", dashed(case)));
-        let curves = curves(outcome.comparisons.iter().filter(|c| c.case == *case).collect());
-        let title = format!("{case}: time against error");
-        plot::write(&path, &title, "milliseconds (median)", "RMS error of radiosity, relative", &curves)?;
-    }
     Ok(())
-}
-
-/// The rivals and the merge in a picture of one case, or at vertices where the camera sees nothing that is lit.
-fn curves(comparisons: Vec<&Comparison>) -> Vec<Curve> {
-    let Some(last) = comparisons.last() else { return Vec::new() };
-    let mut curves = vec![Curve {
-        label: format!("ray casting, {} threads; rays a light", last.threads),
-        points: last.rival.iter().map(|p| (p.wall_ms.median, p.error.rms)).collect(),
-        notes: last.rival.iter().map(|p| p.rays.to_string()).collect(),
-    }];
-    for (filter, label) in [(Filter::Hard, "shadow maps, hard; texels"), (Filter::Pcss, "shadow maps, PCSS; texels")] {
-        let maps: Vec<_> = last.maps.iter().filter(|p| p.filter == filter).collect();
-        curves.push(Curve {
-            label: label.into(),
-            points: maps.iter().map(|p| (p.wall_ms.median, p.error.rms)).collect(),
-            notes: maps.iter().map(|p| p.map_px.to_string()).collect(),
-        });
-    }
-    curves.extend(comparisons.iter().filter(|c| c.place == last.place).map(|c| Curve {
-        label: c.merge_title().into(),
-        points: vec![(c.frame_wall_ms.median, c.merge_error.rms)],
-        notes: Vec::new(),
-    }));
-    curves.retain(|curve| !curve.points.is_empty());
-    curves
 }
 
 /// One row for the merge, and one for each number of rays and each shadow map. Comparisons of one place have the same

@@ -11,7 +11,6 @@ use crate::scene::light::has_sharp;
 use crate::truth::raycast::{Order, RayCast, relative_error};
 use crate::truth::{ExactChain, RayMeshes, Vertex, World, sample_vertices};
 use serde::Serialize;
-use std::time::{Duration, Instant};
 
 /// Number of vertices that are compared per scene.
 pub const VERTICES: usize = 1500;
@@ -53,26 +52,21 @@ pub struct Truth {
     pub t1_error: f64,
     /// Root mean square of `t0`: the unit of relative errors.
     pub unit: f64,
-    /// Root mean square of the radiosity without occlusion.
-    pub unoccluded: f64,
 }
 
 impl Truth {
-    /// Computes T0, T0c and T1; `progress` is told now and then how far it is.
-    pub fn new(case: &Case, effort: Effort, seed: u64, progress: &dyn Fn(&str)) -> Self {
+    pub fn new(case: &Case, effort: Effort, seed: u64) -> Self {
         let placements = case.scene.at(case.time_s);
         let shapes = RayMeshes::new(&case.scene);
         let world = World::new(&case.scene, &shapes, &placements);
         let vertices = sample_vertices(&case.scene, effort.vertices, seed);
         let cast = RayCast { rays: effort.t0_rays, seed, distant: case.distant, ..Default::default() };
-        let lit = in_parts(case, "T0", progress, &vertices, |part| cast.run(&world, part));
+        let lit = cast.run(&world, &vertices);
         let t0: Vec<Radiosity> = lit.iter().map(|e| e.radiosity).collect();
-        let open = RayCast { rays: 256, runs: 1, shadows: false, ..cast }.run(&world, &vertices);
         let t0c = by_centres(&cast, &world, &vertices, &t0);
-        let half = |half| ExactChain { rays: effort.t1_rays / 2, seed: seed ^ half, ..Default::default() };
-        let [first, second] = [(1 << 32, "T1, first half"), (2 << 32, "T1, second half")].map(|(seed, what)| {
-            let chain = half(seed);
-            in_parts(case, what, progress, &vertices, |part| chain.run(&world, part))
+        let [first, second] = [1 << 32, 2 << 32].map(|half| {
+            let chain = ExactChain { rays: effort.t1_rays / 2, seed: seed ^ half, ..Default::default() };
+            chain.run(&world, &vertices)
         });
         let unit = rms(&t0).max(f64::MIN_POSITIVE);
         Truth {
@@ -82,7 +76,6 @@ impl Truth {
             t0_error: relative_error(&lit),
             t1_error: difference(&first, &second, unit).rms / 2.0,
             t1: first.iter().zip(&second).map(|(a, b)| std::array::from_fn(|c| (a[c] + b[c]) / 2.0)).collect(),
-            unoccluded: rms(&open.iter().map(|e| e.radiosity).collect::<Vec<_>>()),
             vertices,
         }
     }
@@ -103,31 +96,6 @@ impl Truth {
     pub fn error(&self, of: &[Radiosity]) -> VertexDifference {
         difference(of, &self.t0, self.unit)
     }
-}
-
-/// Vertices between two looks at the clock.
-const PART: usize = 100;
-/// Time between two words of progress.
-const SILENCE: Duration = Duration::from_secs(5);
-
-/// Computes a value a vertex, part by part, and says how far it is.
-fn in_parts<T>(
-    case: &Case,
-    what: &str,
-    progress: &dyn Fn(&str),
-    vertices: &[Vertex],
-    run: impl Fn(&[Vertex]) -> Vec<T>,
-) -> Vec<T> {
-    let mut out = Vec::with_capacity(vertices.len());
-    let mut told = Instant::now();
-    for part in vertices.chunks(PART) {
-        out.extend(run(part));
-        if told.elapsed() >= SILENCE {
-            progress(&format!("{}: {what}, {} of {} vertices", case.name, out.len(), vertices.len()));
-            told = Instant::now();
-        }
-    }
-    out
 }
 
 /// T0c from T0: only the vertices where the order matters are cast again.
@@ -178,17 +146,11 @@ pub struct Budget {
     pub sampling: VertexDifference,
     /// T2 to T3.
     pub arithmetic_and_storage: VertexDifference,
-    /// T1 to T3: the error that does not come from the number of bands.
-    pub below_bands: VertexDifference,
     /// T0 to T3.
     pub total: VertexDifference,
     /// T0 to the merge on the device with sharp lights, which the rungs are not about; none where no light can be
     /// sharp.
     pub sharp_total: Option<VertexDifference>,
-    /// T0's root mean square over that of the unoccluded value, which converts errors to the unit of the unoccluded
-    /// value.
-    #[serde(rename = "t0_per_unoccluded_ratio")]
-    pub t0_per_unoccluded: f64,
 }
 
 /// Computes T2 and T3 with fields and a merge of the given options, all lights in SH, and compares all rungs; then the
@@ -218,9 +180,7 @@ pub fn budget(bench: &Bench<'_>, case: &Case, truth: &Truth, options: frame::Opt
         bands: between(&truth.t0c, &truth.t1),
         sampling: between(&truth.t1, &t2),
         arithmetic_and_storage: between(&t2, &t3),
-        below_bands: between(&truth.t1, &t3),
         total: between(&truth.t0, &t3),
         sharp_total,
-        t0_per_unoccluded: truth.unit / truth.unoccluded.max(f64::MIN_POSITIVE),
     })
 }

@@ -1,5 +1,4 @@
-//! A case as a person sees it: the picture of the merge beside that of ray casting, by vertex and by pixel, and the
-//! error of every vertex.
+//! A case as a person sees it: the program's picture beside that of rays, and the error of every vertex.
 
 use super::cases::Case;
 use super::judged::PIXEL_SIZE;
@@ -15,13 +14,13 @@ use crate::truth::pixels::pixels;
 use crate::truth::raycast::{Estimate, relative_error};
 use crate::truth::{self, ErrorMap, RayCast, error_map};
 use serde::Serialize;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
-/// Rays of a reference in a quick and in a thorough run, a few seconds on two cores. Vertices and lights share them, so
-/// a scene with fewer vertices gets more rays per vertex.
+/// Rays of a reference in a quick and in a thorough run, a few seconds on two cores. Points and lights share them, so a
+/// scene with fewer vertices gets more rays per vertex.
 const RAYS: [usize; 2] = [8_000_000, 32_000_000];
-/// Size of the pictures in pixels, error pictures without their scale bars.
-const SIZE: [u32; 2] = [720, 480];
+/// Size of the error pictures in pixels, without their scale bars.
+const ERROR_SIZE: [u32; 2] = [720, 480];
 
 /// The pictures of a case and what they show.
 #[derive(Clone, Debug, Serialize)]
@@ -31,11 +30,6 @@ pub struct CasePicture {
     /// The error of every lit vertex in false colour.
     #[serde(flatten)]
     pub errors: ErrorPicture,
-    /// Path of the merge's picture with that of ray casting at its right, both lit by vertex.
-    pub beside: String,
-    /// Mean FLIP between the two as a screen shows them, 0 to 1.
-    #[serde(rename = "mean_flip_ratio")]
-    pub mean_flip: f64,
     /// The program's own picture against rays that are cast from what each pixel shows.
     pub pixels: PixelError,
 }
@@ -58,31 +52,17 @@ pub struct PixelError {
     pub mean_flip: f64,
 }
 
-/// Writes `error-CASE.png`, `beside-CASE.png` and `pixels-CASE.png` into `folder`. For the first two ray casting lights
-/// vertices, as the merge does, and both are drawn alike, with the scene's exposure; for the last the program draws as
-/// it always does.
+/// Writes `error-CASE.png` and `pixels-CASE.png` into `folder`.
 pub fn pictures(bench: &Bench<'_>, case: &Case, folder: &Path) -> Result<CasePicture> {
     let placements = case.scene.at(case.time_s);
-    let options = frame::Options { size: SIZE, antialias: Antialias::Samples, ..default_options() };
+    let options = frame::Options { size: ERROR_SIZE, antialias: Antialias::Samples, ..default_options() };
     let mut frame = bench.frame(&case.scene, options)?;
     frame.render(&placements, None)?;
-    let found = error_map::radiosity(&frame)?;
-    // By vertex, as the reference below: what pixels evaluate by themselves is not what vertices are judged by.
-    frame.redraw(&placements, case.scene.data.output.white())?;
-    let merged = frame.picture();
-
     let cast = cast(bench, case, frame.receiver_vertex_count());
     let (reference, noise) = truth::picture(&case.scene, &placements, &cast);
-    for (entity, radiosity) in &reference {
-        frame.set_radiosity(*entity, radiosity)?;
-    }
-    frame.redraw(&placements, case.scene.data.output.white())?;
-    let (beside, mean_flip) = beside(case, SIZE, [&merged, &frame.picture()], &named(folder, "beside", case))?;
-
-    let map = ErrorMap::new(&found, &reference, Scheme::Signed);
+    let map = ErrorMap::new(&error_map::radiosity(&frame)?, &reference, Scheme::Signed);
     let errors = map.write(&named(folder, "error", case), &mut frame, &placements, None, noise)?;
-    let pixels = pixel_error(bench, case, folder)?;
-    Ok(CasePicture { case: case.name.clone(), errors, beside, mean_flip, pixels })
+    Ok(CasePicture { case: case.name.clone(), errors, pixels: pixel_error(bench, case, folder)? })
 }
 
 /// Ray casting with as many rays a point as [`RAYS`] allows.
@@ -118,28 +98,26 @@ fn pixel_error(bench: &Bench<'_>, case: &Case, folder: &Path) -> Result<PixelErr
         }
     }
     let estimates: Vec<Estimate> = lit.iter().map(|(_, estimate)| *estimate).collect();
-    let (beside, mean_flip) = beside(case, PIXEL_SIZE, [&found, &wanted], &named(folder, "pixels", case))?;
-    let rms = (apart / whole).sqrt();
-    Ok(PixelError { beside, lit_count: lit.len(), rms, reference_error: relative_error(&estimates), mean_flip })
-}
 
-/// Writes two pictures beside each other with the scene's exposure. Returns the path, and their mean FLIP.
-fn beside(case: &Case, size: [u32; 2], [left, right]: [&[f32]; 2], path: &Path) -> Result<(String, f64)> {
     let exposure_ev = case.scene.data.output.exposure_ev();
-    let [width, height] = size;
-    let row = 3 * width as usize;
-    let both: Vec<f32> = left.chunks(row).zip(right.chunks(row)).flat_map(|(l, r)| [l, r]).flatten().copied().collect();
-    picture::write_png(path, 2 * width, height, &both, exposure_ev)?;
     let exposed = |linear: &[f32]| -> Vec<f32> { linear.iter().map(|c| c * exposure_ev.exp2()).collect() };
-    Ok((path.display().to_string(), mean_flip(width as usize, &exposed(left), &exposed(right))))
+    let [width, height] = PIXEL_SIZE;
+    let row = 3 * width as usize;
+    let rows = found.chunks(row).zip(wanted.chunks(row));
+    let both: Vec<f32> = rows.flat_map(|(left, right)| [left, right]).flatten().copied().collect();
+    let path = named(folder, "pixels", case);
+    picture::write_png(&path, 2 * width, height, &both, exposure_ev)?;
+    Ok(PixelError {
+        beside: path.display().to_string(),
+        lit_count: lit.len(),
+        rms: (apart / whole).sqrt(),
+        reference_error: relative_error(&estimates),
+        mean_flip: mean_flip(width as usize, &exposed(&found), &exposed(&wanted)),
+    })
 }
 
-fn named(folder: &Path, kind: &str, case: &Case) -> std::path::PathBuf {
-    folder.join(format!("{kind}-{}.png", dashed(&case.name)))
-}
-
-/// The name of a case, with dashes for what a file's name should not have.
-fn dashed(name: &str) -> String {
-    let words: Vec<&str> = name.split(|c: char| !c.is_ascii_alphanumeric()).filter(|w| !w.is_empty()).collect();
-    words.join("-")
+/// A picture's path, with dashes for what a file's name should not have.
+fn named(folder: &Path, kind: &str, case: &Case) -> PathBuf {
+    let words = case.name.split(|c: char| !c.is_ascii_alphanumeric()).filter(|word| !word.is_empty());
+    folder.join(format!("{kind}-{}.png", words.collect::<Vec<_>>().join("-")))
 }

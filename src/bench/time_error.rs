@@ -46,7 +46,7 @@ impl TimeErrorOutcome {
     }
 }
 
-/// Measures, and writes into `folder`: `budget.csv`, `sweep.csv`, `rival.csv`, `time-error.json`, and three pictures a
+/// Measures, and writes into `folder`: `budget.csv`, `sweep.csv`, `rival.csv`, `time-error.json`, and two pictures a
 /// case. `own` is the case of the selected scene file.
 pub fn run(bench: &Bench<'_>, folder: &Path, selection: &Selection, own: Option<Case>) -> Result<TimeErrorOutcome> {
     let sweeps_all = own.is_some() || !selection.cases.is_empty();
@@ -68,7 +68,7 @@ pub fn run(bench: &Bench<'_>, folder: &Path, selection: &Selection, own: Option<
             *outcome.seconds.entry(part).or_default() += started.elapsed().as_secs_f64();
             started = Instant::now();
         };
-        let truth = Truth::new(case, effort, bench.seed, bench.progress);
+        let truth = Truth::new(case, effort, bench.seed);
         truth.check(case)?;
         took(&mut outcome, "casting the truth's rays");
         outcome.budgets.push(budget(bench, case, &truth, default_options())?);

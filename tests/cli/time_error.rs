@@ -155,8 +155,9 @@ fn a_scene_of_ones_own() {
     let written = names(&out);
     let pixels = &outcome["pictures"][0]["pixels"];
     assert!(pixels["lit_count"].as_u64().unwrap() > 10_000, "{pixels}");
-    assert!(rms(pixels) < 0.15 && pixels["mean_flip_ratio"].as_f64().unwrap() < 0.1, "{pixels}");
-    for name in ["pixels-my-ring.png", "beside-my-ring.png", "error-my-ring.png"] {
+    let flip = pixels["mean_flip_ratio"].as_f64().unwrap();
+    assert!(rms(pixels) < 0.15 && flip > 0.0 && flip < 0.1, "{pixels}");
+    for name in ["pixels-my-ring.png", "error-my-ring.png"] {
         assert!(written.iter().any(|found| found == name), "{name} among {written:?}");
     }
     let picture =

@@ -266,7 +266,7 @@ fn a_budget_knows_both_orders_at_every_vertex() {
     ));
     let case = Case::at_start("ring".into(), scene, Distant::Exact);
     let effort = Effort { vertices: 150, t0_rays: 256, t1_rays: 32 };
-    let truth = Truth::new(&case, effort, 3, &|_| ());
+    let truth = Truth::new(&case, effort, 3);
     truth.check(&case).unwrap();
     let shapes = RayMeshes::new(&case.scene);
     let world = World::new(&case.scene, &shapes, &case.scene.at(0.0));

@@ -17,6 +17,7 @@ use serde::Serialize;
 use serde_json::json;
 use std::f64::consts::PI;
 use std::path::Path;
+use std::sync::LazyLock;
 
 /// Bands of the transfer in all chains.
 const BANDS: usize = 4;
@@ -44,12 +45,6 @@ pub struct CapChain {
     /// Factors rounded to f16, guarded products in f64.
     #[serde(rename = "guarded_f16_relative")]
     pub f16: f64,
-    /// Unguarded products with visibility of 5 bands.
-    #[serde(rename = "plain_5_bands_relative")]
-    pub bands_5: f64,
-    /// Unguarded products with visibility of 6 bands.
-    #[serde(rename = "plain_6_bands_relative")]
-    pub bands_6: f64,
     /// Unguarded products with visibility of 7 bands: with 4 bands of transfer the chain cannot grow.
     #[serde(rename = "plain_7_bands_relative")]
     pub bands_7: f64,
@@ -78,48 +73,33 @@ impl StabilityOutcome {
     }
 }
 
-/// Rule by which a chain multiplies.
-#[derive(Clone, Copy, Default)]
-struct Rule {
-    visibility_bands: usize,
-    guard: bool,
-    single: bool,
-    half: bool,
-}
-
 /// A cap: axis and half angle in radians.
 type Cap = (DVec3, f64);
+type Coefficients = [f64; MAX_COEFFICIENTS];
 
-fn chain(caps: &[Cap], rule: Rule) -> f64 {
-    let tensor = Tensor::new(BANDS, rule.visibility_bands, BANDS);
-    let multiplier = Multiplier::new(BANDS, rule.visibility_bands);
+/// Irradiance behind caps whose visibility has so many bands; `multiply` takes the blocked part of one off the rest.
+fn chain(caps: &[Cap], visibility_bands: usize, multiply: fn(&Multiplier, &mut Coefficients, &[f64])) -> f64 {
+    let multiplier = Multiplier::new(BANDS, visibility_bands);
     let mut t = multiplier.begin(&clamped_cosine(BANDS, DVec3::Y));
     for &(axis, half_angle) in caps {
         let mut blocked = [0.0; MAX_COEFFICIENTS];
-        let exact = cap(rule.visibility_bands, axis, half_angle);
-        for (to, from) in blocked.iter_mut().zip(exact) {
-            *to = if rule.half { f16::from_f64(from).to_f64() } else { from };
-        }
-        if rule.single {
-            subtract_single(&tensor, &mut t, &blocked);
-        } else {
-            if rule.guard {
-                multiplier.multiply(&mut t, &blocked)
-            } else {
-                multiplier.multiply_unguarded(&mut t, &blocked)
-            }
-        }
+        let exact = cap(visibility_bands, axis, half_angle);
+        blocked[..exact.len()].copy_from_slice(&exact);
+        multiply(&multiplier, &mut t, &blocked);
     }
     // Unit irradiance: radiance 1 / pi, whose expansion is sqrt(4 pi) / pi in the constant band.
     t[0] * (4.0 * PI).sqrt() / PI
 }
 
+/// The visibility matrix of 4 bands, which is the same for every chain.
+static TENSOR: LazyLock<Tensor> = LazyLock::new(|| Tensor::new(BANDS, BANDS, BANDS));
+
 /// One guarded product in single precision, as in `glsl/merge_product.glsl`.
-fn subtract_single(tensor: &Tensor, t: &mut [f64; MAX_COEFFICIENTS], blocked: &[f64; MAX_COEFFICIENTS]) {
+fn multiply_single(t: &mut Coefficients, blocked: &[f64]) {
     let before: Vec<f32> = t.iter().map(|c| *c as f32).collect();
     let rest_of = |c: &[f32]| c[1..].iter().map(|c| c * c).sum::<f32>();
     let mut after = before.clone();
-    for entry in tensor.entries() {
+    for entry in TENSOR.entries() {
         after[entry.k] -= entry.value as f32 * (before[entry.i] * blocked[entry.j] as f32);
     }
     let first = before[0];
@@ -156,23 +136,21 @@ pub fn chains(seed: u64, longest: usize) -> Vec<CapChain> {
     for (name, caps) in [("identical, 30 degrees", identical), ("distinct, 10 to 40 degrees", distinct)] {
         for count in [1, 2, 4, 8, 16, 64, 256, 1000].into_iter().filter(|n| *n <= longest) {
             let caps = &caps[..count];
-            let base = Rule { visibility_bands: BANDS, ..Rule::default() };
-            let of_bands = |visibility_bands| chain(caps, Rule { visibility_bands, ..base });
-            let guard = Rule { guard: true, ..base };
-            let guarded = chain(caps, guard);
-            let f32 = chain(caps, Rule { single: true, ..guard });
-            let f16 = chain(caps, Rule { half: true, ..guard });
+            let guarded = chain(caps, BANDS, Multiplier::multiply);
+            let f32 = chain(caps, BANDS, |_, t, blocked| multiply_single(t, blocked));
+            let f16 = chain(caps, BANDS, |multiplier, t, blocked| {
+                let rounded: Vec<f64> = blocked.iter().map(|b| f16::from_f64(*b).to_f64()).collect();
+                multiplier.multiply(t, &rounded);
+            });
             out.push(CapChain {
                 caps: name,
                 count,
                 truth: truth(caps, &points),
-                plain: chain(caps, base),
+                plain: chain(caps, BANDS, Multiplier::multiply_unguarded),
                 guarded,
                 f32,
                 f16,
-                bands_5: of_bands(5),
-                bands_6: of_bands(6),
-                bands_7: of_bands(7),
+                bands_7: chain(caps, 7, Multiplier::multiply_unguarded),
                 passed: (0.0..=1.0).contains(&guarded)
                     && (f32 - guarded).abs() < NEAR_F32
                     && (f16 - guarded).abs() < NEAR_F16,

@@ -55,12 +55,12 @@ impl Arguments {
 }
 
 /// Parses a radiance.
-pub(super) fn color(text: &str) -> std::result::Result<Vec3, String> {
+fn color(text: &str) -> std::result::Result<Vec3, String> {
     triple(number(0.0..=RADIANCE_LIMIT))(text).map(Vec3::from_array)
 }
 
 /// A mesh whose surface shines. Its colours are its own, or white, times `radiance`.
-pub(super) fn shining(mesh: Mesh, radiance: Vec3, path: &Path) -> Result<Mesh> {
+fn shining(mesh: Mesh, radiance: Vec3, path: &Path) -> Result<Mesh> {
     let white = vec![Vec3::ONE; mesh.positions.len()];
     let colors: Vec<Vec3> = mesh.colors.as_ref().unwrap_or(&white).iter().map(|c| *c * radiance).collect();
     if colors.iter().any(|c| c.max_element() > RADIANCE_LIMIT) {

@@ -1,22 +1,17 @@
 //! `shadow-fields inspect` shows what is in a field file.
 
-use super::bake::{color, shining};
-use super::context::Context;
 use super::outputs::{Output, Outputs};
-use super::sheet::{self, Cell};
+use super::sheet::{self, Cell, Row};
 use super::{Global, output, silhouette};
-use crate::asset::Mesh;
-use crate::bake::{self, snapshot::snapshot};
 use crate::error::{Error, Result, one_line};
 use crate::field::file;
 use crate::field::silhouette::SILHOUETTE_MAGIC;
-use crate::field::{FieldHeader, FieldKind, ShadowField, growth};
-use crate::scene;
+use crate::field::{FieldKind, ShadowField, growth};
 use crate::sh::basis::{MAX_COEFFICIENTS, coefficient_count, evaluate};
 use crate::sh::cube;
 use crate::text::{self, number, triple};
 use clap::Args;
-use glam::{DVec3, Vec3};
+use glam::DVec3;
 use serde_json::json;
 use std::path::{Path, PathBuf};
 
@@ -24,7 +19,7 @@ use std::path::{Path, PathBuf};
 #[derive(Args)]
 #[command(
     after_help = "Examples:\n  shadow-fields inspect teapot.sf\n  shadow-fields inspect teapot.sf --at 0,1.5,2\n  \
-    shadow-fields inspect teapot.sf --faces sheet.png --mesh assets/meshes/teapot.obj"
+    shadow-fields inspect teapot.sf --faces sheet.png"
 )]
 pub struct Arguments {
     /// Field file to show, as `bake` writes it
@@ -38,12 +33,6 @@ pub struct Arguments {
     /// Write a picture of the cube faces that the coefficients describe, over latitude, longitude and distance
     #[arg(long, value_name = "OUT.png")]
     faces: Option<PathBuf>,
-    /// With --faces: capture this mesh anew, and show its faces beside those from the coefficients
-    #[arg(long, value_name = "MESH.obj", requires = "faces")]
-    mesh: Option<PathBuf>,
-    /// With --mesh: the linear RGB radiance that a radiance field was baked with. The default is 1,1,1
-    #[arg(long, value_name = "R,G,B", requires = "mesh", value_parser = color, allow_hyphen_values = true)]
-    radiance: Option<Vec3>,
 }
 
 /// Farthest coordinate of a lookup in metres.
@@ -70,9 +59,7 @@ fn silhouette(global: &Global, arguments: &Arguments) -> Result<()> {
 /// Shows a field.
 pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
     if let Some(path) = &arguments.faces {
-        let mut inputs = vec![arguments.field.clone()];
-        inputs.extend(arguments.mesh.iter().flat_map(|mesh| scene::files::of_mesh(mesh)));
-        Outputs::check(&inputs, &[Output::new("--faces", path, "png")])?;
+        Outputs::check(std::slice::from_ref(&arguments.field), &[Output::new("--faces", path, "png")])?;
     }
     if file::has_magic(&arguments.field, SILHOUETTE_MAGIC) {
         return silhouette(global, arguments);
@@ -93,8 +80,7 @@ pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
         result["at"] = lookup(&field, position_m);
     }
     if let Some(path) = &arguments.faces {
-        let mesh = arguments.mesh.as_deref().map(|path| baked_mesh(header, path, arguments.radiance)).transpose()?;
-        write_sheet(global, &field, mesh.as_ref(), path)?;
+        write_sheet(global, &field, path)?;
     }
     if global.json {
         output::say(result.to_string());
@@ -136,30 +122,6 @@ pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
     Ok(())
 }
 
-/// The mesh that a field was baked from, with the colours that it had then.
-fn baked_mesh(header: &FieldHeader, path: &Path, radiance: Option<Vec3>) -> Result<Mesh> {
-    let (mut mesh, _) = scene::load_mesh(path)?;
-    if header.kind == FieldKind::Radiance {
-        mesh = shining(mesh, radiance.unwrap_or(Vec3::ONE), path)?;
-    } else if radiance.is_some() {
-        return Err(Error::Usage("--radiance goes with a radiance field, and this one holds occlusion".into()));
-    }
-    if bake::hash_text(&mesh) == header.mesh_hash {
-        return Ok(mesh);
-    }
-    let (centre, radius_m) = mesh.bounding_sphere();
-    let of = |centre: [f32; 3], radius_m: f32| format!("centre {centre:?} m, radius {radius_m} m");
-    let same_size = centre.to_array() == header.centre_m && radius_m == header.radius_m;
-    let why = match (header.kind, same_size) {
-        (FieldKind::Radiance, true) => {
-            "it is as large: say with --radiance which colour the field was baked with".to_owned()
-        }
-        (_, true) => "it is as large, but has other triangles".to_owned(),
-        _ => format!("{}; this one has {}", of(header.centre_m, header.radius_m), of(centre.to_array(), radius_m)),
-    };
-    Err(Error::input(path, format!("is not the mesh {} that the field was baked from ({why})", header.mesh)))
-}
-
 /// The coefficients at a place in the mesh's frame, in metres.
 fn lookup(field: &ShadowField, position_m: DVec3) -> serde_json::Value {
     let centre = DVec3::from_array(field.header.centre_m.map(f64::from));
@@ -187,10 +149,9 @@ const LATITUDES_DEG: [f64; 3] = [45.0, 0.0, -45.0];
 /// Shells of the sheet, as fractions of their number.
 const SHELLS: [f64; 4] = [0.0, 0.3, 0.6, 1.0];
 
-fn write_sheet(global: &Global, field: &ShadowField, mesh: Option<&Mesh>, path: &Path) -> Result<()> {
+fn write_sheet(global: &Global, field: &ShadowField, path: &Path) -> Result<()> {
     let lattice = field.header.lattice;
     let mut rows = Vec::new();
-    let mut eyes = Vec::new();
     for latitude_deg in LATITUDES_DEG {
         for fraction in SHELLS {
             let shell = (fraction * f64::from(lattice.shells - 1)).round() as u32;
@@ -201,48 +162,28 @@ fn write_sheet(global: &Global, field: &ShadowField, mesh: Option<&Mesh>, path: 
                 let longitude = std::f64::consts::TAU * column as f64 / LONGITUDES as f64;
                 let direction =
                     DVec3::new(latitude.cos() * longitude.cos(), latitude.sin(), latitude.cos() * longitude.sin());
-                let eye = lattice.fit().invert(direction * distance);
-                eyes.push(eye);
-                cells.push(reconstruct(field, eye));
+                cells.push(reconstruct(field, lattice.fit().invert(direction * distance)));
             }
-            rows.push((format!("{latitude_deg:+.0} deg, {distance:.2} r"), cells));
+            rows.push(Row { label: format!("{latitude_deg:+.0} deg, {distance:.2} r"), cells, white: 1.0 });
         }
     }
-    // Visibility has one white for the whole sheet. The radiance from the coefficients falls with the square of the
-    // distance, so each row has a white of its own. Captured faces keep the surface's radiance and are cut at that
-    // white.
-    let brightest = |rows: &[(String, Vec<Cell>)], least: f32| {
-        rows.iter().flat_map(|(_, cells)| cells.iter().flatten()).fold(least, |m, c| m.max(*c))
+    // Visibility has one white for the whole sheet. Radiance falls with the square of the distance, so each row has a
+    // white of its own.
+    let brightest = |rows: &[Row], least: f32| {
+        rows.iter().flat_map(|row| row.cells.iter().flatten()).fold(least, |most, value| most.max(*value))
     };
-    let whites: Vec<f32> = match field.header.kind {
-        FieldKind::Occlusion => vec![brightest(&rows, 1.0); rows.len()],
-        FieldKind::Radiance => rows.chunks(1).map(|row| brightest(row, f32::MIN_POSITIVE)).collect(),
-    };
-    if let Some(mesh) = mesh {
-        let context = Context::new(global)?;
-        let kind = field.header.kind;
-        let faces = snapshot(&context.device, context.baker.library(), mesh, &eyes, FACE_PX as u32, kind)?;
-        let mut captured = faces.chunks(LONGITUDES);
-        for (_, cells) in &mut rows {
-            let fresh = captured.next().ok_or_else(|| Error::Failed("a captured row is missing".into()))?;
-            *cells = fresh.iter().zip(&*cells).flat_map(|(a, b)| [a.clone(), b.clone()]).collect();
-        }
-        context.finish()?;
+    let white = brightest(&rows, 1.0);
+    for row in &mut rows {
+        row.white = match field.header.kind {
+            FieldKind::Occlusion => white,
+            FieldKind::Radiance => brightest(std::slice::from_ref(row), f32::MIN_POSITIVE),
+        };
+        row.label += &format!(", white {}", text::three(f64::from(row.white)));
     }
     let columns: Vec<String> = (0..LONGITUDES).map(|c| format!("{} deg", 360 * c / LONGITUDES)).collect();
-    let per_column = if mesh.is_some() { 2 } else { 1 };
-    for ((label, _), white) in rows.iter_mut().zip(&whites) {
-        *label += &format!(", white {}", text::three(f64::from(*white)));
-    }
-    sheet::write(path, &columns, per_column, &rows, FACE_PX, &whites)?;
-    let pairs = if mesh.is_some() { ", each captured (left) and from the coefficients (right)" } else { "" };
-    output::note(
-        global,
-        format!(
-            "{}: cubes unfolded: -X +Z +X -Z in a row, +Y above, -Y below; \"white\": the value shown as white{pairs}",
-            output::shown(path)
-        ),
-    );
+    sheet::write(path, &columns, &rows, FACE_PX)?;
+    let what = "cubes unfolded: -X +Z +X -Z in a row, +Y above, -Y below; \"white\": the value shown as white";
+    output::note(global, format!("{}: {what}", output::shown(path)));
     Ok(())
 }
 

@@ -16,6 +16,14 @@ const MARGIN: usize = 104;
 /// Where each face stands in the unfolded cube, in faces from the left and the top.
 const PLACES: [(usize, usize); 6] = [(2, 1), (0, 1), (1, 0), (1, 2), (1, 1), (3, 1)];
 
+/// A row of cells with its label on the left, of up to three lines, parted by ", ".
+pub struct Row {
+    pub label: String,
+    pub cells: Vec<Cell>,
+    /// The value that is shown as white.
+    pub white: f32,
+}
+
 struct Canvas {
     width: usize,
     height: usize,
@@ -34,26 +42,18 @@ impl Canvas {
     }
 }
 
-/// Writes a sheet: `per_column` cells under each column's label, a row label of up to three lines, parted by ", ", on
-/// the left. Values up to a row's white are shown.
-pub fn write(
-    path: &Path,
-    columns: &[String],
-    per_column: usize,
-    rows: &[(String, Vec<Cell>)],
-    face_px: usize,
-    whites: &[f32],
-) -> Result<()> {
+/// Writes a sheet: a cell under each column's label in every row.
+pub fn write(path: &Path, columns: &[String], rows: &[Row], face_px: usize) -> Result<()> {
     let cell_width = 4 * face_px + GAP;
     let cell_height = 3 * face_px + GAP;
-    let width = MARGIN + columns.len() * per_column * cell_width;
+    let width = MARGIN + columns.len() * cell_width;
     let height = TEXT + GAP + rows.len() * cell_height;
     let mut canvas = Canvas { width, height, rgb: vec![0.35; 3 * width * height] };
     for (index, label) in columns.iter().enumerate() {
-        canvas.text(MARGIN + index * per_column * cell_width, 2, label);
+        canvas.text(MARGIN + index * cell_width, 2, label);
     }
-    for (row, ((label, cells), white)) in rows.iter().zip(whites).enumerate() {
-        let top = TEXT + GAP + row * cell_height;
+    for (index, Row { label, cells, white }) in rows.iter().enumerate() {
+        let top = TEXT + GAP + index * cell_height;
         for (line, words) in label.split(", ").enumerate() {
             canvas.text(GAP, top + face_px / 2 + (TEXT + 2) * line, words);
         }

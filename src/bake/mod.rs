@@ -36,7 +36,6 @@ pub mod raster;
 mod refine;
 mod samples;
 pub mod silhouette;
-pub mod snapshot;
 pub mod surface;
 pub mod surfaces;
 pub mod triangles;

@@ -69,7 +69,6 @@ fn outputs_do_not_replace_inputs() {
         ("compare a.png b.png -o a.png", "--output a.png", "a.png"),
         ("compare a.png b.png -o b.png", "--output b.png", "b.png"),
         ("compare a.png b.png --mask mask.png -o mask.png", "--output mask.png", "mask.png"),
-        ("inspect buffer.sf --faces scene.png --mesh s.toml", "--faces scene.png", "s.toml"),
     ] {
         refused(&folder, line, 2, &[output, &format!("input {input}")]);
     }

@@ -2,7 +2,7 @@
 
 use super::context::Context;
 use super::{Global, output, outputs};
-use crate::asset::{embedded, picture};
+use crate::asset::picture;
 use crate::bench::cases;
 use crate::bench::figures::spread;
 use crate::draw::{Antialias, Finish};
@@ -44,8 +44,6 @@ const SCENES: [(&str, bool); 7] = [
 const ANIMATION: (u32, u16) = (36, 12);
 /// Size of an animation's pictures.
 const ANIMATION_SIZE: [u32; 2] = [480, 320];
-/// Scene of the picture without its occluder.
-const LIT_SCENE: &str = "sphere_over_plane";
 
 /// Bakes and renders the built-in scenes.
 pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
@@ -64,7 +62,6 @@ pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
             written.push(animation(&context, arguments, name, &scene)?);
         }
     }
-    written.push(without_occluder(&context, arguments)?);
     let origin = context.origin(global);
     if arguments.options.variant.is_none() {
         context.learn(global)?;
@@ -215,18 +212,4 @@ fn animation(context: &Context, arguments: &Arguments, name: &str, scene: &Scene
     let path = arguments.output.join(format!("{name}_animation.png"));
     picture::write_apng(&path, options.size[0], options.size[1], pictures.into_iter().map(Ok), fps)?;
     Ok(path)
-}
-
-/// A picture of one scene without its occluder.
-fn without_occluder(context: &Context, arguments: &Arguments) -> Result<PathBuf> {
-    let scene = cases::scene(LIT_SCENE)?.scene;
-    let mut bare = scene.data.clone();
-    let stays = |index: usize| scene.entities[index].emits || scene.meshes[scene.entities[index].mesh].is_flat();
-    bare.entities = bare.entities.iter().enumerate().filter(|(i, _)| stays(*i)).map(|(_, e)| e.clone()).collect();
-    let source = format!("assets/scenes/{LIT_SCENE}.toml");
-    let bare = Scene::parse(&bare.to_toml()?, Path::new(&source), &embedded::read)?;
-    let alone = arguments.output.join(format!("{LIT_SCENE}_without_occluder.png"));
-    let options = arguments.options.frame(&bare)?;
-    draw(&mut context.frame(&bare, options)?, &bare, options, &alone)?;
-    Ok(alone)
 }

@@ -169,7 +169,6 @@ fn print_time_error(out: &Path, outcome: &TimeErrorOutcome) {
     output::say("Relative RMS error over vertices against rays from them, by cause (p99 and max of the total)");
     let columns = [
         ("scene", "/case"),
-        ("centre rule", "/centre_rule/rms_relative"),
         ("bands", "/bands/rms_relative"),
         ("sampling", "/sampling/rms_relative"),
         ("storage", "/arithmetic_and_storage/rms_relative"),

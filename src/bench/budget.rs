@@ -8,7 +8,7 @@ use crate::field::Storage;
 use crate::frame::{self, Frame};
 use crate::scene::Lights;
 use crate::scene::light::has_sharp;
-use crate::truth::raycast::{Order, RayCast, relative_error};
+use crate::truth::raycast::{RayCast, relative_error};
 use crate::truth::{ExactChain, RayMeshes, Vertex, World, sample_vertices};
 use serde::Serialize;
 
@@ -37,15 +37,13 @@ impl Effort {
     }
 }
 
-/// T0, T0c and T1 of a case, which do not depend on options of bake or merge.
+/// T0 and T1 of a case, which do not depend on options of bake or merge.
 pub struct Truth {
     pub vertices: Vec<Vertex>,
     /// Radiosity of T0, by ray casting.
     pub t0: Vec<Radiosity>,
     /// Relative standard error of `t0`.
     pub t0_error: f64,
-    /// Radiosity of T0c, by the same rays with the merge's order of centres.
-    pub t0c: Vec<Radiosity>,
     /// Radiosity of T1: exact factors, band-limited chain.
     pub t1: Vec<Radiosity>,
     /// Relative standard error of `t1`, from two halves of its rays.
@@ -63,7 +61,6 @@ impl Truth {
         let cast = RayCast { rays: effort.t0_rays, seed, distant: case.distant, ..Default::default() };
         let lit = cast.run(&world, &vertices);
         let t0: Vec<Radiosity> = lit.iter().map(|e| e.radiosity).collect();
-        let t0c = by_centres(&cast, &world, &vertices, &t0);
         let [first, second] = [1 << 32, 2 << 32].map(|half| {
             let chain = ExactChain { rays: effort.t1_rays / 2, seed: seed ^ half, ..Default::default() };
             chain.run(&world, &vertices)
@@ -71,7 +68,6 @@ impl Truth {
         let unit = rms(&t0).max(f64::MIN_POSITIVE);
         Truth {
             unit,
-            t0c,
             t0,
             t0_error: relative_error(&lit),
             t1_error: difference(&first, &second, unit).rms / 2.0,
@@ -96,16 +92,6 @@ impl Truth {
     pub fn error(&self, of: &[Radiosity]) -> VertexDifference {
         difference(of, &self.t0, self.unit)
     }
-}
-
-/// T0c from T0: only the vertices where the order matters are cast again.
-fn by_centres(cast: &RayCast, world: &World<'_>, vertices: &[Vertex], t0: &[Radiosity]) -> Vec<Radiosity> {
-    let mut out = t0.to_vec();
-    let differ: Vec<usize> = (0..vertices.len()).filter(|&i| RayCast::order_matters(world, vertices[i])).collect();
-    let again: Vec<Vertex> = differ.iter().map(|&i| vertices[i]).collect();
-    let lit = RayCast { order: Order::Centres, ..*cast }.run(world, &again);
-    differ.into_iter().zip(lit).for_each(|(i, e)| out[i] = e.radiosity);
-    out
 }
 
 /// Values of the compared vertices, from values of all vertices by entity.
@@ -138,9 +124,7 @@ pub struct Budget {
     /// T1's own relative standard error.
     #[serde(rename = "t1_error_relative")]
     pub t1_error: f64,
-    /// T0 to T0c: what the merge's order of centres costs.
-    pub centre_rule: VertexDifference,
-    /// T0c to T1.
+    /// T0 to T1, the merge's order of occluders and lights by their centres included.
     pub bands: VertexDifference,
     /// T1 to T2.
     pub sampling: VertexDifference,
@@ -176,8 +160,7 @@ pub fn budget(bench: &Bench<'_>, case: &Case, truth: &Truth, options: frame::Opt
         vertices: truth.vertices.len(),
         t0_error: truth.t0_error,
         t1_error: truth.t1_error,
-        centre_rule: between(&truth.t0, &truth.t0c),
-        bands: between(&truth.t0c, &truth.t1),
+        bands: between(&truth.t0, &truth.t1),
         sampling: between(&truth.t1, &t2),
         arithmetic_and_storage: between(&t2, &t3),
         total: between(&truth.t0, &t3),

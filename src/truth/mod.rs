@@ -5,7 +5,6 @@
 //! | rung | what | where |
 //! |---|---|---|
 //! | T0 | rays against the placed meshes, full visibility: what they meet before a light's surface blocks it | [`raycast`] |
-//! | T0c | the same with the merge's rule for what lies before a light: the order of centres | [`raycast::Order::Centres`] |
 //! | T1 | exact visibility of every occluder projected to SH, exact chain of products | [`exact`] |
 //! | T2 | fields looked up, f64 | [`crate::merge::twin`] |
 //! | T3 | the merge on the device, f32 | [`crate::merge`] |
@@ -16,9 +15,8 @@
 //! or shadows itself.
 //!
 //! T0 is physical: an occluder, or a part of the receiver itself, blocks a ray only where the ray meets it before the
-//! light. From T0c on an occluder precedes a light as a whole or not at all, if its bounding sphere's centre is nearer
-//! to the vertex (ties by index), and the receiver shadows itself from what lies beyond the light too. Without local
-//! lights T0 and T0c are the same.
+//! light. From T1 on an occluder precedes a light as a whole or not at all, if its bounding sphere's centre is nearer
+//! to the vertex (ties by index), and the receiver shadows itself from what lies beyond the light too.
 
 pub mod difference;
 #[cfg(feature = "cli")]

@@ -22,16 +22,6 @@ pub enum Distant {
     Bands(usize),
 }
 
-/// What counts as lying before a local light.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Order {
-    /// What a ray meets before the light's surface.
-    Surfaces,
-    /// The merge's rule for SH fields, [`EntityView::precedes`]: an occluder that is no sheet counts as a whole or not
-    /// at all, by the centres of the bounding spheres, and the receiver shadows itself from what lies beyond the light too.
-    Centres,
-}
-
 #[derive(Clone, Copy, Debug)]
 pub struct RayCast {
     /// Rays per vertex for the distant light, and the same number for every local light; at least `runs`. Powers of two
@@ -41,10 +31,6 @@ pub struct RayCast {
     pub runs: u32,
     pub seed: u64,
     pub distant: Distant,
-    /// Whether occluders block rays; if not, the result is the unoccluded value.
-    pub shadows: bool,
-    /// What counts as lying before a local light.
-    pub order: Order,
     /// How often light bounces; each ray that counts it is followed from surface to surface, which reflect diffusely
     /// with their base colour.
     pub bounces: u32,
@@ -55,16 +41,7 @@ pub struct RayCast {
 impl Default for RayCast {
     /// 4096 rays in 8 runs, which stop at what they meet.
     fn default() -> Self {
-        RayCast {
-            rays: 4096,
-            runs: 8,
-            seed: 1,
-            distant: Distant::Exact,
-            shadows: true,
-            order: Order::Surfaces,
-            bounces: 0,
-            single_scatter: false,
-        }
+        RayCast { rays: 4096, runs: 8, seed: 1, distant: Distant::Exact, bounces: 0, single_scatter: false }
     }
 }
 
@@ -161,14 +138,11 @@ impl RayCast {
         occluders.retain(|occluder| occluder.rises_above(view.normal));
         // Near occluders come first, because they are the most likely to block a ray.
         occluders.sort_by(|a, b| a.distance_m.total_cmp(&b.distance_m));
-        if !self.shadows {
-            occluders.clear();
-        }
         let lights: Vec<Shadowed> = world
             .lights(view)
             .into_iter()
             .filter(|light| light.rises_above(view.normal))
-            .map(|light| Shadowed::new(world, view, light, &occluders, self.order))
+            .map(|light| Shadowed::new(view, light, &occluders))
             .collect();
 
         let mut sum = DVec3::ZERO;
@@ -208,9 +182,8 @@ impl RayCast {
         }
         let Point { world, view, surface, points } = at;
         let arrives = |direction: DVec3| {
-            let blocked = self.shadows
-                && (occluders.iter().any(|occluder| world.blocks(occluder, direction, f64::INFINITY))
-                    || world.blocks_itself(view, direction, f64::INFINITY));
+            let blocked = occluders.iter().any(|occluder| world.blocks(occluder, direction, f64::INFINITY))
+                || world.blocks_itself(view, direction, f64::INFINITY);
             if blocked { DVec3::ZERO } else { radiance.at(direction) }
         };
         self.gather(view, surface, points, &arrives)
@@ -253,7 +226,7 @@ impl RayCast {
         let arrives = |direction: DVec3| {
             let cosine = direction.dot(view.normal);
             let pattern = (cosine > 0.0 && surface.sees(direction)).then(|| world.emission(light, direction)).flatten();
-            let seen = pattern.filter(|_| !(self.shadows && shadowed.hidden(world, view, direction)));
+            let seen = pattern.filter(|_| !shadowed.hidden(world, view, direction));
             (cosine, seen.unwrap_or(DVec3::ZERO))
         };
         let mut sum = DVec3::ZERO;
@@ -320,17 +293,6 @@ impl RayCast {
         }
         sum
     }
-
-    /// Whether the orders can differ at a vertex: whether what might shadow a light there, the receiver itself
-    /// included, lies neither wholly before nor wholly beyond it.
-    pub fn order_matters(world: &World<'_>, vertex: Vertex) -> bool {
-        let view = world.view(vertex);
-        let occluders = world.occluders(&view);
-        world.lights(&view).into_iter().filter(|light| light.rises_above(view.normal)).any(|light| {
-            let shadowed = Shadowed::new(world, &view, light, &occluders, Order::Surfaces);
-            shadowed.limits_itself || !shadowed.beside.is_empty()
-        })
-    }
 }
 
 /// A point of a surface on which light falls, and the points of the unit square that its rays are of.
@@ -354,7 +316,7 @@ const TIE: f64 = 1e-5;
 /// A local light as seen from a vertex, and what may hide it there.
 struct Shadowed {
     light: EntityView,
-    /// Occluders that lie wholly before it, or all that count in [`Order::Centres`].
+    /// Occluders that lie wholly before it.
     before: Vec<EntityView>,
     /// Occluders that a ray may meet before the light or beyond it.
     beside: Vec<EntityView>,
@@ -363,21 +325,16 @@ struct Shadowed {
 }
 
 impl Shadowed {
-    fn new(world: &World<'_>, view: &VertexView, light: EntityView, occluders: &[EntityView], order: Order) -> Self {
+    fn new(view: &VertexView, light: EntityView, occluders: &[EntityView]) -> Self {
         let [near, far] = light.range_m();
         // The comparison of distances comes first, because that of cones costs an arc cosine.
-        let by_surface = |o: &EntityView| order == Order::Surfaces || world.is_sheet(o.entity);
-        let nearer = |o: &&EntityView| match by_surface(o) {
-            true => o.entity != light.entity && o.range_m()[0] < far && o.overlaps(&light),
-            false => o.precedes(&light) && o.overlaps(&light),
-        };
+        let nearer = |o: &&EntityView| o.entity != light.entity && o.range_m()[0] < far && o.overlaps(&light);
         let mut before = Vec::new();
         let mut beside = Vec::new();
         for occluder in occluders.iter().filter(nearer) {
-            let wholly = !by_surface(occluder) || occluder.range_m()[1] <= near;
-            if wholly { &mut before } else { &mut beside }.push(*occluder);
+            if occluder.range_m()[1] <= near { &mut before } else { &mut beside }.push(*occluder);
         }
-        let limits_itself = order == Order::Surfaces && view.own().is_some_and(|own| own.range_m()[1] > near);
+        let limits_itself = view.own().is_some_and(|own| own.range_m()[1] > near);
         Shadowed { light, before, beside, limits_itself }
     }
 

@@ -132,11 +132,6 @@ impl<'s> World<'s> {
         others.map(|&j| self.sight(j, self.beside(j, view))).collect()
     }
 
-    /// Whether an occluder is a rectangle.
-    pub fn is_sheet(&self, occluder: usize) -> bool {
-        self.scene.caster(self.scene.entities[occluder].mesh).rectangle().is_some()
-    }
-
     /// An occluder as a vertex sees it, where it is a rectangle.
     pub fn sheet(&self, occluder: usize, view: &VertexView) -> Option<SheetView> {
         let Rectangle { axes, half_m } = self.scene.caster(self.scene.entities[occluder].mesh).rectangle()?;

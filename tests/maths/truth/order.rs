@@ -1,25 +1,22 @@
-//! What stands before what: by surfaces, as it is, and by centres, as the merge takes it.
+//! What stands before a light: what a ray meets before the light's surface.
 
 use super::{ball, bulb, floor_positions, scene};
-use shadow_fields::truth::raycast::{Order, RayCast};
-use shadow_fields::truth::{RayMeshes, Vertex, World, receiver_vertices};
+use shadow_fields::truth::{RayCast, RayMeshes, Vertex, World, receiver_vertices};
+
 /// Radiosity of the floor's middle, where the light's cone stands upright, of a light of radius `radius_m` at
 /// `height_m`: albedo 0.6, radiance 9.
 fn below(radius_m: f64, height_m: f64) -> f64 {
     0.6 * 9.0 * (radius_m / height_m).powi(2)
 }
 
-/// Radiosity of the floor's middle with entities `rest`, by surfaces and by centres.
-fn middle(rest: &str) -> [f64; 2] {
+/// Radiosity of the floor's middle with entities `rest`.
+fn middle(rest: &str) -> f64 {
     let scene = scene(rest);
     let shapes = RayMeshes::new(&scene);
     let world = World::new(&scene, &shapes, &scene.at(0.0));
     let (middle, _) = floor_positions(&scene).into_iter().find(|(_, at)| at.length() < 1e-6).unwrap();
-    let found = [Order::Surfaces, Order::Centres]
-        .map(|order| RayCast { order, ..Default::default() }.run(&world, &[middle])[0].radiosity[0]);
-    let [surfaces, centres] = found;
-    assert!(found.iter().all(|b| b.is_finite()), "{found:?} of {rest}");
-    assert!(surfaces == centres || RayCast::order_matters(&world, middle), "{found:?} of {rest}");
+    let found = RayCast::default().run(&world, &[middle])[0].radiosity[0];
+    assert!(found.is_finite(), "{found} of {rest}");
     found
 }
 
@@ -32,35 +29,30 @@ fn near(found: f64, expected: f64) -> bool {
 fn an_occluder_between_two_lights_hides_the_farther_one() {
     let (first, second) = (bulb(0.1, [0.0, 1.0, 0.0]), bulb(0.1, [0.0, 3.0, 0.0]));
     let between = ball(0.5, [0.0, 2.0, 0.0]);
-    for found in middle(&format!("{first}{second}")) {
-        assert!(near(found, below(0.1, 1.0) + below(0.1, 3.0)), "lights are transparent for one another: {found}");
-    }
-    for found in middle(&format!("{first}{between}{second}")) {
-        assert!(near(found, below(0.1, 1.0)), "{found}");
-    }
+    let found = middle(&format!("{first}{second}"));
+    assert!(near(found, below(0.1, 1.0) + below(0.1, 3.0)), "lights are transparent for one another: {found}");
+    let found = middle(&format!("{first}{between}{second}"));
+    assert!(near(found, below(0.1, 1.0)), "{found}");
     // A light that occludes hides what lies behind it, and not itself.
     let solid = first.replace("receives", "occludes = true\nreceives");
-    for found in middle(&format!("{solid}{second}")) {
-        assert!(near(found, below(0.1, 1.0)), "{found}");
-    }
+    let found = middle(&format!("{solid}{second}"));
+    assert!(near(found, below(0.1, 1.0)), "{found}");
 }
 
 #[test]
 fn what_lies_behind_a_lights_surface_hides_nothing_though_its_centre_is_nearer() {
     let light = bulb(1.0, [0.0, 3.0, 0.0]);
-    let [surfaces, centres] = middle(&format!("{light}{}", ball(0.2, [0.0, 2.5, 0.0])));
-    assert!(near(surfaces, below(1.0, 3.0)), "{surfaces}");
-    assert!(near(centres, below(1.0, 3.0) - below(0.2, 2.5)), "the centre rule takes away its disc: {centres}");
+    let found = middle(&format!("{light}{}", ball(0.2, [0.0, 2.5, 0.0])));
+    assert!(near(found, below(1.0, 3.0)), "{found}");
     // It counts by the part that a ray meets first: a cap that looks out of the light.
-    let [surfaces, centres] = middle(&format!("{light}{}", ball(0.2, [0.0, 2.0, 0.0])));
-    let seen = below(1.0, 3.0) - below(0.2, 2.0);
-    assert!(near(centres, seen) && surfaces > seen && surfaces < below(1.0, 3.0), "{surfaces} {centres}");
+    let found = middle(&format!("{light}{}", ball(0.2, [0.0, 2.0, 0.0])));
+    assert!(found > below(1.0, 3.0) - below(0.2, 2.0), "less than its disc: {found}");
     // The circle in which the two spheres meet: 1 and 0.2 m around centres 1 m apart, seen from 2 and 3 m below.
     let along = (1.0 - 0.04 + 1.0) / 2.0;
     let radius_squared = 1.0 - along * along;
     let height = 3.0 - along;
     let cap = 0.6 * 9.0 * radius_squared / (radius_squared + height * height);
-    assert!((surfaces - (below(1.0, 3.0) - cap)).abs() < 5e-3 * below(1.0, 3.0), "{surfaces} less {cap}");
+    assert!((found - (below(1.0, 3.0) - cap)).abs() < 5e-3 * below(1.0, 3.0), "{found} less {cap}");
 }
 
 #[test]
@@ -68,12 +60,10 @@ fn a_big_occluder_hides_a_light_though_its_centre_is_farther() {
     let plate = "[[mesh]]\nname = \"plate\"\ncuboid = { size_m = [3, 0.1, 3], cells = 2 }\n";
     let entity = "[[entity]]\nmesh = \"plate\"\nposition = [1.3, 1.6, 0]\nreceives = false\n";
     let light = bulb(0.1, [0.0, 2.0, 0.0]);
-    let [surfaces, centres] = middle(&format!("{light}{entity}{plate}"));
-    assert_eq!(surfaces, 0.0);
-    assert!(near(centres, below(0.1, 2.0)), "the centre rule overlooks it: {centres}");
+    assert_eq!(middle(&format!("{light}{entity}{plate}")), 0.0);
     // The same plate above the light.
-    let [surfaces, _] = middle(&format!("{light}{}{plate}", entity.replace("1.6", "2.4")));
-    assert!(near(surfaces, below(0.1, 2.0)), "{surfaces}");
+    let found = middle(&format!("{light}{}{plate}", entity.replace("1.6", "2.4")));
+    assert!(near(found, below(0.1, 2.0)), "{found}");
 }
 
 #[test]
@@ -83,14 +73,10 @@ fn a_light_in_the_hole_of_a_torus_shines_through_the_hole_alone() {
     // A hair to either side of the torus's centre, and in it.
     for height in [1.99, 2.0, 2.01] {
         let light = bulb(0.1, [0.0, height, 0.0]);
-        for found in middle(&format!("{torus}{light}")) {
-            assert!(near(found, below(0.1, height)), "flat, seen through its hole: {found}");
-        }
+        let found = middle(&format!("{torus}{light}"));
+        assert!(near(found, below(0.1, height)), "flat, seen through its hole: {found}");
         let upright = torus.replace("receives", "rotation = { axis = [1, 0, 0], angle_deg = 90 }\nreceives");
-        let [surfaces, centres] = middle(&format!("{upright}{light}"));
-        assert_eq!(surfaces, 0.0, "on edge, behind its tube");
-        let rule = if height < 2.0 { below(0.1, height) } else { 0.0 };
-        assert!((centres - rule).abs() <= 5e-3 * rule, "{centres}: by the centres alone, here and there");
+        assert_eq!(middle(&format!("{upright}{light}")), 0.0, "on edge, behind its tube");
     }
 }
 
@@ -105,10 +91,8 @@ fn a_receiver_is_lit_across_its_own_hole_by_a_light_within() {
     let inner = |v: &Vertex| v.entity == 1 && mesh.positions[v.index].length() < 0.601;
     let vertices: Vec<Vertex> = receiver_vertices(&scene).into_iter().filter(inner).collect();
     assert!(vertices.len() >= 96, "{}", vertices.len());
-    for (order, expected) in [(Order::Surfaces, below(0.1, 0.6)), (Order::Centres, 0.0)] {
-        for lit in (RayCast { order, ..Default::default() }).run(&world, &vertices) {
-            assert!((lit.radiosity[0] - expected).abs() <= 5e-3 * expected, "{order:?}: {lit:?}, not {expected}");
-        }
+    for lit in RayCast::default().run(&world, &vertices) {
+        assert!(near(lit.radiosity[0], below(0.1, 0.6)), "{lit:?}");
     }
 }
 
@@ -118,22 +102,20 @@ fn surfaces_that_touch_and_coincide_stay_bounded() {
     let open = below(0.5, 2.0);
     for occluder in ["", "rotation = { axis = [1, 2, 3], angle_deg = 40 }\n"] {
         let same = format!("{}{occluder}", ball(0.5, [0.0, 2.0, 0.0]));
-        let [surfaces, _] = middle(&format!("{light}{same}"));
+        let found = middle(&format!("{light}{same}"));
         // Turned, the facets of one pierce those of the other.
-        let expected = if occluder.is_empty() { open } else { surfaces };
-        assert!(near(surfaces, expected) && surfaces <= open, "the light's surface is the nearer one: {surfaces}");
+        let expected = if occluder.is_empty() { open } else { found };
+        assert!(near(found, expected) && found <= open, "the light's surface is the nearer one: {found}");
     }
     for place in [[0.0, 1.0, 0.0], [0.0, 3.0, 0.0], [1.0, 2.0, 0.0], [0.0, 0.5, 0.0], [0.0, 0.0, 0.0]] {
         let touching = ball(0.5, place);
-        for found in middle(&format!("{light}{touching}")) {
-            assert!((0.0..=open * 1.005).contains(&found), "{found} beside {place:?}");
-        }
+        let found = middle(&format!("{light}{touching}"));
+        assert!((0.0..=open * 1.005).contains(&found), "{found} beside {place:?}");
     }
     // A light that touches the floor, and the floor within a light.
     for height in [0.5, 0.3, 0.0] {
-        for found in middle(&bulb(0.5, [0.0, height, 0.0])) {
-            assert!((0.0..=0.6 * 9.0 * 1.001).contains(&found), "{found} at {height}");
-        }
+        let found = middle(&bulb(0.5, [0.0, height, 0.0]));
+        assert!((0.0..=0.6 * 9.0 * 1.001).contains(&found), "{found} at {height}");
     }
 }
 
@@ -142,7 +124,7 @@ fn a_tiny_light_far_away_has_its_size() {
     // Half angles of 0.05 to 0.5 degrees: 1 146 to 115 radii away.
     for half_angle_deg in [0.05_f64, 0.2, 0.5] {
         let radius = 100.0 * half_angle_deg.to_radians().sin();
-        let [found, _] = middle(&bulb(radius, [0.0, 100.0, 0.0]));
+        let found = middle(&bulb(radius, [0.0, 100.0, 0.0]));
         assert!(near(found, below(radius, 100.0)), "{half_angle_deg}: {found}, not {}", below(radius, 100.0));
     }
 }

@@ -5,12 +5,14 @@ use super::{Global, output, outputs};
 use crate::asset::picture;
 use crate::bench::cases;
 use crate::bench::figures::spread;
-use crate::draw::{Antialias, Finish};
+use crate::bench::profile::frame_times;
+use crate::draw::Antialias;
 use crate::error::Result;
 use crate::frame::{self, Frame, RenderOptions};
 use crate::scene::Scene;
 use clap::Args;
 use serde_json::json;
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
@@ -149,48 +151,29 @@ fn still(
     let first_picture_s = started.elapsed().as_secs_f64();
     written.push(path);
 
-    let ways = [Antialias::Outlines, Antialias::Samples, Antialias::None];
-    let mut timed = ways.map(|antialias| (antialias, Times::default()));
-    for (antialias, times) in &mut timed {
-        frame.set_finish(Finish::Display, *antialias)?;
-        for index in 0..arguments.timed_frames + 2 {
-            let placements = scene.at(f64::from(index) / 30.0);
-            let start = Instant::now();
-            let passes = frame.show(&placements, scene.data.output.white())?;
-            let wall = start.elapsed().as_secs_f64() * 1e3;
-            if index >= 2 {
-                let of = |name: &str| passes.iter().find(|t| t.pass == name).map_or(0.0, |t| t.milliseconds);
-                times.merge.push(of("merge") + of("sharp"));
-                times.draw.push(of("draw") + of("smooth"));
-                times.whole.push(wall);
-            }
-        }
-    }
-    let [(_, times), (_, samples), (_, single)] = &timed;
-    let median = |values: &[f64]| spread(values).median;
+    let mut timed = |antialias| frame_times(&mut frame, scene, antialias, arguments.timed_frames);
+    let outlines = timed(Antialias::Outlines)?;
+    let samples = timed(Antialias::Samples)?;
+    let single = timed(Antialias::None)?;
+    let median = |times: &BTreeMap<String, Vec<f64>>, passes: &[&str]| -> f64 {
+        passes.iter().filter_map(|pass| times.get(*pass)).map(|times| spread(times).median).sum()
+    };
+    let draw = ["draw", "smooth"];
     Ok(DemoRow {
         scene: name,
         vertices: frame.receiver_vertex_count(),
         entities: scene.entities.len(),
         bake_s: frame.buffers.baked.iter().map(|b| b.report.total.as_secs_f64()).sum(),
-        merge_ms: median(&times.merge),
-        draw_ms: median(&times.draw),
-        frame_ms: median(&times.whole),
-        draw_4_samples_ms: median(&samples.draw),
-        frame_4_samples_ms: median(&samples.whole),
-        draw_1_sample_ms: median(&single.draw),
-        frame_1_sample_ms: median(&single.whole),
+        merge_ms: median(&outlines, &["merge", "sharp"]),
+        draw_ms: median(&outlines, &draw),
+        frame_ms: median(&outlines, &["frame"]),
+        draw_4_samples_ms: median(&samples, &draw),
+        frame_4_samples_ms: median(&samples, &["frame"]),
+        draw_1_sample_ms: median(&single, &draw),
+        frame_1_sample_ms: median(&single, &["frame"]),
         first_picture_s,
         variant: frame.variant().name,
     })
-}
-
-/// Milliseconds of the timed frames.
-#[derive(Default)]
-struct Times {
-    merge: Vec<f64>,
-    draw: Vec<f64>,
-    whole: Vec<f64>,
 }
 
 fn draw(frame: &mut Frame, scene: &Scene, options: frame::Options, path: &Path) -> Result<()> {

@@ -2,26 +2,18 @@
 
 use super::Bench;
 use super::ceilings::Ceilings;
-use super::figures::quantiles;
+use super::figures::{Spread, spread};
 use crate::draw::{Antialias, Finish};
 use crate::error::Result;
-use crate::frame;
+use crate::frame::{self, Frame};
 use crate::gpu::census::Census;
 use crate::merge::Merge;
 use crate::merge::variant::{MergePermutation, Variant};
 use crate::merge::workload::Workload;
-use crate::scene::{Lights, Placement, Scene};
+use crate::scene::{Lights, Scene};
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::time::Instant;
-
-/// Median, and the values below and above which a tenth of all lies.
-#[derive(Clone, Copy, Debug, Default, Serialize)]
-pub struct Tenths {
-    pub p10: f64,
-    pub median: f64,
-    pub p90: f64,
-}
 
 /// Work of a merge for a pair of vertex and occluder, counted in the SPIR-V of the loop's body.
 #[derive(Clone, Copy, Debug, Serialize)]
@@ -44,7 +36,7 @@ pub struct ProfileRow {
     /// Of the merge its variant, of passes of pictures how their edges are smoothed.
     pub variant: String,
     /// Device time.
-    pub ms: Tenths,
+    pub ms: Spread,
     /// Nanoseconds a pair of vertex and occluder. Only merges have this and the values below, and only where the time
     /// is not mostly that of starting a dispatch (see [`Ceilings::resolve`]).
     pub ns_a_pair: Option<f64>,
@@ -62,12 +54,11 @@ pub struct ProfileRow {
 impl ProfileRow {
     /// A pass whose work is not counted.
     fn timed(case: &str, pass: &str, variant: &str, times: &[f64]) -> Self {
-        let [p10, median, p90] = quantiles(times, [0.1, 0.5, 0.9]);
         ProfileRow {
             case: case.to_owned(),
             pass: pass.to_owned(),
             variant: variant.to_owned(),
-            ms: Tenths { p10, median, p90 },
+            ms: spread(times),
             ..ProfileRow::default()
         }
     }
@@ -159,16 +150,16 @@ pub fn scene(
     at_best: &Ceilings,
 ) -> Result<Vec<ProfileRow>> {
     let options = frame::Options { size, ..super::default_options() };
-    let placements: Vec<Vec<Placement>> = (0..=runs).map(|run| scene.at(f64::from(run) / 30.0)).collect();
     let mut merges = Vec::new();
     for &variant in chosen {
         // A pair of the merge is one of harmonics, so all lights are in bands here.
         let options = frame::Options { variant: Some(variant), lights: Lights::Sh, ..options };
         merges.push((variant, bench.frame(scene, options)?, Vec::new()));
     }
-    for (run, placements) in placements.iter().enumerate() {
+    for run in 0..=runs {
+        let placements = scene.at(f64::from(run) / 30.0);
         for (_, frame, times) in &mut merges {
-            let passes = frame.render(placements, None)?;
+            let passes = frame.render(&placements, None)?;
             if run > 0 {
                 times.extend(passes.iter().filter(|timed| timed.pass == "merge").map(|timed| timed.milliseconds));
             }
@@ -184,20 +175,34 @@ pub fn scene(
     let mut frame = bench.frame(scene, options)?;
     let ways = [Antialias::Samples, Antialias::Outlines, Antialias::None];
     for (antialias, way) in ways.into_iter().zip(["4 samples", "1 sample, outlines", "1 sample"]) {
-        frame.set_finish(Finish::Display, antialias)?;
-        let mut times: BTreeMap<String, Vec<f64>> = BTreeMap::new();
-        for (run, placements) in placements.iter().enumerate() {
-            let started = Instant::now();
-            let passes = frame.show(placements, 1.0)?;
-            let wall_ms = started.elapsed().as_secs_f64() * 1e3;
-            if run > 0 {
-                times.entry("frame".to_owned()).or_default().push(wall_ms);
-                for timed in passes {
-                    times.entry(timed.pass).or_default().push(timed.milliseconds);
-                }
-            }
-        }
+        let times = frame_times(&mut frame, scene, antialias, runs)?;
         rows.extend(times.iter().map(|(pass, times)| ProfileRow::timed(name, pass, way, times)));
     }
     Ok(rows)
+}
+
+/// Times of frames of a scene that moves, as a window shows them, in milliseconds: device time of every pass, and "frame"
+/// by the host's clock. Two frames before these warm up.
+pub fn frame_times(
+    frame: &mut Frame,
+    scene: &Scene,
+    antialias: Antialias,
+    frames: u32,
+) -> Result<BTreeMap<String, Vec<f64>>> {
+    const WARM_UP: u32 = 2;
+    frame.set_finish(Finish::Display, antialias)?;
+    let mut times: BTreeMap<String, Vec<f64>> = BTreeMap::new();
+    for index in 0..WARM_UP + frames {
+        let placements = scene.at(f64::from(index) / 30.0);
+        let started = Instant::now();
+        let passes = frame.show(&placements, scene.data.output.white())?;
+        let wall_ms = started.elapsed().as_secs_f64() * 1e3;
+        if index >= WARM_UP {
+            times.entry("frame".to_owned()).or_default().push(wall_ms);
+            for timed in passes {
+                times.entry(timed.pass).or_default().push(timed.milliseconds);
+            }
+        }
+    }
+    Ok(times)
 }

@@ -88,7 +88,7 @@ pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
             let inputs: Vec<PathBuf> = scene.iter().flat_map(|path| scene::files::of_scene(path)).collect();
             let selection = Selection { scene: scene.clone(), cases: case.clone(), axes: axis.clone() };
             let measured = |bench: &Bench<'_>| time_error::run(bench, &run.out, &selection, own);
-            measure(global, run, &inputs, measured, |outcome| print_time_error(&run.out, outcome))?;
+            measure(global, run, &inputs, measured, print_time_error)?;
         }
         What::Stability(run) => {
             let outcome = measure(global, run, &[], |bench| stability::run(bench, &run.out), print_stability)?;
@@ -165,7 +165,7 @@ pub fn table(rows: &impl Serialize, columns: &[(&str, &str)]) {
     output::table(&header, &cells.collect::<Vec<_>>());
 }
 
-fn print_time_error(out: &Path, outcome: &TimeErrorOutcome) {
+fn print_time_error(outcome: &TimeErrorOutcome) {
     output::say("Relative RMS error over vertices against rays from them, by cause (p99 and max of the total)");
     let columns = [
         ("scene", "/case"),
@@ -210,7 +210,6 @@ fn print_time_error(out: &Path, outcome: &TimeErrorOutcome) {
         ];
         table(&outcome.points, &columns);
     }
-    output::say(format!("\n{}: this run took {}", output::shown(out), outcome.took()));
 }
 
 fn print_stability(outcome: &StabilityOutcome) {

@@ -9,7 +9,6 @@ use std::path::Path;
 /// A scene at one time, and the distant light that its truth integrates.
 pub struct Case {
     pub name: String,
-    pub light: String,
     pub scene: Scene,
     pub time_s: f64,
     /// Form of the distant light that ray casting integrates.
@@ -19,7 +18,7 @@ pub struct Case {
 impl Case {
     /// A scene at time 0.
     pub fn at_start(name: String, scene: Scene, distant: Distant) -> Self {
-        Case { name, light: light(&scene), scene, time_s: 0.0, distant }
+        Case { name, scene, time_s: 0.0, distant }
     }
 
     /// The scene of a file at the time of its first picture, named after the file.
@@ -67,25 +66,6 @@ pub fn scene(name: &str) -> Result<Case> {
     let path = Path::new(embedded::ROOT).join("scenes").join(format!("{name}.toml"));
     let scene = Scene::load(&path)?;
     Ok(Case::at_start(name.to_owned(), scene, Distant::Exact))
-}
-
-/// Description of a scene's light: its distant light and the number of local lights.
-pub fn light(scene: &Scene) -> String {
-    let source = scene.environment.source();
-    let named = [
-        (source.uniform.is_some(), "uniform sky"),
-        (source.gradient.is_some(), "sky gradient"),
-        (source.key.is_some(), "soft key light"),
-        (source.sky.is_some(), "daylight"),
-        (source.image.is_some(), "sky picture"),
-    ];
-    let mut words: Vec<String> = named.iter().filter(|(is, _)| *is).map(|(_, word)| (*word).to_owned()).collect();
-    match scene.entities.iter().filter(|e| e.emits).count() {
-        0 => {}
-        1 => words.push("1 local light".into()),
-        count => words.push(format!("{count} local lights")),
-    }
-    words.join(" + ")
 }
 
 /// Cells along a side of the floor of [`teapot_lights`]: as many vertices as the floors of the embedded scenes have.

@@ -59,11 +59,9 @@ impl MapPoint {
 /// Merge, ray casting and shadow maps on one case.
 #[derive(Clone, Debug, Serialize)]
 pub struct Comparison {
-    /// Scene and light.
     pub case: String,
-    /// The case with its light, where it is lit and how lights are taken.
+    /// The case, how the merge takes its lights, and where it is judged.
     pub title: String,
-    pub light: String,
     pub place: JudgedAt,
     #[serde(rename = "point_count")]
     pub points: usize,
@@ -191,7 +189,6 @@ impl Merged {
         let mut comparison = Comparison {
             case: case.name.clone(),
             title: String::new(),
-            light: case.light.clone(),
             place: judged.place,
             points: judged.points.len(),
             threads: rayon::current_num_threads(),
@@ -209,7 +206,7 @@ impl Merged {
             rival: rival.to_vec(),
         };
         let place = if judged.place == JudgedAt::Pixels { "pixels" } else { "vertices" };
-        comparison.title = format!("{} ({}), {} at {place}", case.name, case.light, comparison.merge_title());
+        comparison.title = format!("{}, {} at {place}", case.name, comparison.merge_title());
         Ok(comparison)
     }
 }

@@ -10,9 +10,7 @@ use crate::error::{Error, Result};
 use crate::text::{csv, write};
 use serde::Serialize;
 use serde_json::{Value, json};
-use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
-use std::time::Instant;
 
 /// The selected cases and axes; an empty list selects all, but for cases that run only when they are named.
 #[derive(Clone, Debug, Default, Serialize)]
@@ -24,7 +22,7 @@ pub struct Selection {
     pub axes: Vec<String>,
 }
 
-#[derive(Serialize)]
+#[derive(Default, Serialize)]
 pub struct TimeErrorOutcome {
     /// One row per scene and light.
     pub budgets: Vec<Budget>,
@@ -34,16 +32,6 @@ pub struct TimeErrorOutcome {
     pub points: Vec<Point>,
     /// Rows of each case: at vertices and at pixels, and by every way to take the lights.
     pub comparisons: Vec<Comparison>,
-    /// Wall time of the parts of the run, in seconds over all cases.
-    pub seconds: BTreeMap<&'static str, f64>,
-}
-
-impl TimeErrorOutcome {
-    /// Description of the run's wall time by parts.
-    pub fn took(&self) -> String {
-        let parts: Vec<String> = self.seconds.iter().map(|(part, s)| format!("{part} {s:.0}")).collect();
-        format!("{:.0} s in all: {}", self.seconds.values().sum::<f64>(), parts.join(", "))
-    }
 }
 
 /// Measures, and writes into `folder`: `budget.csv`, `sweep.csv`, `rival.csv`, `time-error.json`, and two pictures a
@@ -53,33 +41,18 @@ pub fn run(bench: &Bench<'_>, folder: &Path, selection: &Selection, own: Option<
     let cases = own.map_or_else(|| chosen(bench.quick, &selection.cases), |case| Ok(vec![case]))?;
     let all = variations_of(bench.quick, &selection.axes)?;
     crate::text::make_folder(folder)?;
-    let mut outcome = TimeErrorOutcome {
-        budgets: Vec::new(),
-        pictures: Vec::new(),
-        points: Vec::new(),
-        comparisons: Vec::new(),
-        seconds: BTreeMap::new(),
-    };
+    let mut outcome = TimeErrorOutcome::default();
     let effort = Effort::new(bench.quick);
     for (index, case) in cases.iter().enumerate() {
         (bench.progress)(&format!("case {} of {}, {}: casting rays", index + 1, cases.len(), case.name));
-        let mut started = Instant::now();
-        let mut took = |outcome: &mut TimeErrorOutcome, part| {
-            *outcome.seconds.entry(part).or_default() += started.elapsed().as_secs_f64();
-            started = Instant::now();
-        };
         let truth = Truth::new(case, effort, bench.seed);
         truth.check(case)?;
-        took(&mut outcome, "casting the truth's rays");
         outcome.budgets.push(budget(bench, case, &truth, default_options())?);
-        took(&mut outcome, "baking and budgets");
+        (bench.progress)(&format!("{}: errors split into their causes", case.name));
         outcome.pictures.push(pictures(bench, case, folder)?);
-        took(&mut outcome, "pictures");
         outcome.comparisons.extend(compare(bench, case, &truth)?);
-        took(&mut outcome, "the rival");
         if is_swept(case) || sweeps_all {
             outcome.points.extend(sweep(bench, case, &truth, &all)?);
-            took(&mut outcome, "sweeps with their bakes");
         }
     }
     write_all(bench, folder, selection, &outcome)?;
@@ -136,7 +109,7 @@ fn write_all(bench: &Bench<'_>, folder: &Path, selection: &Selection, outcome: &
 fn rival_rows(comparison: &Comparison) -> Vec<Value> {
     let row = |what: String, wall_ms: f64, error| {
         json!({
-            "case": comparison.case, "light": comparison.light, "place": comparison.place, "what": what,
+            "case": comparison.case, "place": comparison.place, "what": what,
             "point_count": comparison.points, "thread_count": comparison.threads, "wall_ms": wall_ms, "error": error,
             "speed_up_at_equal_rms_ratio": comparison.speed_up_at_equal_rms,
             "merge_speed_up_at_equal_rms_ratio": comparison.merge_speed_up_at_equal_rms, "rays_at_equal_rms_count": comparison.rays_at_equal_rms,

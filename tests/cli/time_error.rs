@@ -115,7 +115,6 @@ fn a_scene_of_ones_own() {
         assert_eq!(outcome[part][0]["case"], "my ring");
     }
     assert_eq!(outcome["points"].as_array().unwrap().len(), 2, "it is swept");
-    assert_eq!(outcome["comparisons"][0]["light"], "1 local light");
     let total = rms(&outcome["budgets"][0]["total"]);
     assert!(total > 0.01 && total < 0.3, "four bands below a small light: {total}");
     // Sharp lights beside lights in SH, against the same rivals.

@@ -4,7 +4,6 @@ use super::context::Context;
 use super::outputs::{Numbered, Output, Outputs};
 use super::source::{GltfSceneArguments, LookArguments};
 use super::{Global, output};
-use crate::asset::false_color::Scheme;
 use crate::asset::picture;
 use crate::bench::figures::spread;
 use crate::draw::Antialias;
@@ -54,13 +53,10 @@ pub struct Arguments {
     /// Cast rays through every pixel instead of using shadow fields: slow, and what pictures should look like
     #[arg(long, group = "judge")]
     reference: bool,
-    /// Also write the error of the last picture's vertices in false colour, with a scale bar: against rays from the
-    /// same vertices, which pixels between them do not enter
+    /// Also write the error of the last picture's vertices in false colour, too dark in blue and too bright in red, with
+    /// a scale bar: against rays from the same vertices, which pixels between them do not enter
     #[arg(long, value_name = "E.png", group = "judge", conflicts_with = "reference")]
     error: Option<PathBuf>,
-    /// Colours of --error: signed shows too dark in blue and too bright in red, absolute shows the size of the error
-    #[arg(long, default_value = "signed", value_name = "SCHEME", requires = "error")]
-    error_scheme: Scheme,
     /// With --error: the error that gets the last colour of the scale, relative to the root mean square of the
     /// radiosity; default: the 99th percentile, rounded up
     #[arg(long, value_name = "X", value_parser = number::<f64>((Bound::Excluded(0.0), Bound::Unbounded)), requires = "error", allow_negative_numbers = true)]
@@ -301,7 +297,7 @@ impl<'a> Rendering<'a> {
         let (Some(path), Some(frame)) = (&self.arguments.error, &mut self.frame) else { return Ok(Value::Null) };
         frame.render(&last, None)?;
         let (reference, noise) = truth::picture(frame.scene(), &last, &cast);
-        let map = ErrorMap::new(&error_map::radiosity(frame)?, &reference, self.arguments.error_scheme);
+        let map = ErrorMap::new(&error_map::radiosity(frame)?, &reference);
         Ok(json!(map.write(path, frame, &last, self.arguments.error_limit, noise)?))
     }
 

@@ -7,7 +7,7 @@ use super::lettering;
 use super::picture::linear_from_srgb;
 
 /// Quantity that the colours show.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, clap::ValueEnum)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Scheme {
     /// Blue where a value is too small, red where it is too large.

@@ -3,7 +3,6 @@
 use super::cases::Case;
 use super::judged::PIXEL_SIZE;
 use super::{Bench, default_options};
-use crate::asset::false_color::Scheme;
 use crate::asset::picture;
 use crate::draw::{Antialias, Shading};
 use crate::error::Result;
@@ -60,7 +59,7 @@ pub fn pictures(bench: &Bench<'_>, case: &Case, folder: &Path) -> Result<CasePic
     frame.render(&placements, None)?;
     let cast = cast(bench, case, frame.receiver_vertex_count());
     let (reference, noise) = truth::picture(&case.scene, &placements, &cast);
-    let map = ErrorMap::new(&error_map::radiosity(&frame)?, &reference, Scheme::Signed);
+    let map = ErrorMap::new(&error_map::radiosity(&frame)?, &reference);
     let errors = map.write(&named(folder, "error", case), &mut frame, &placements, None, noise)?;
     Ok(CasePicture { case: case.name.clone(), errors, pixels: pixel_error(bench, case, folder)? })
 }

@@ -25,11 +25,8 @@ pub struct ErrorPicture {
 /// Errors of the lit vertices of a frame against a reference.
 #[derive(Clone, Debug)]
 pub struct ErrorMap {
-    /// By entity, one error per vertex in units of `unit`: the mean over channels of the signed difference, or, for
-    /// [`Scheme::Absolute`], the root mean square over channels.
+    /// By entity, one error per vertex in units of `unit`: the mean over channels of the signed difference.
     pub errors: Vec<(usize, Vec<f64>)>,
-    /// Signed or absolute errors.
-    pub scheme: Scheme,
     /// Root mean square of the reference over vertices and channels, linear radiance.
     pub unit: f64,
 }
@@ -37,21 +34,18 @@ pub struct ErrorMap {
 impl ErrorMap {
     /// Compares radiosity by entity (linear RGB per vertex) with a reference for the same entities, such as
     /// [`super::picture`]'s.
-    pub fn new(found: &[EntityRadiosity], reference: &[EntityRadiosity], scheme: Scheme) -> Self {
+    pub fn new(found: &[EntityRadiosity], reference: &[EntityRadiosity]) -> Self {
         let squares = || reference.iter().flat_map(|(_, v)| v.iter().flatten()).map(|c| f64::from(*c).powi(2));
         let unit = (squares().sum::<f64>() / squares().count().max(1) as f64).sqrt().max(f64::MIN_POSITIVE);
         let of = |found: &[f32; 3], wanted: &[f32; 3]| {
             let apart: [f64; 3] = std::array::from_fn(|c| (f64::from(found[c]) - f64::from(wanted[c])) / unit);
-            match scheme {
-                Scheme::Signed => apart.iter().sum::<f64>() / 3.0,
-                Scheme::Absolute => (apart.iter().map(|d| d * d).sum::<f64>() / 3.0).sqrt(),
-            }
+            apart.iter().sum::<f64>() / 3.0
         };
         let entity = |((entity, found), (other, wanted)): (&EntityRadiosity, &EntityRadiosity)| {
             assert_eq!((entity, found.len()), (other, wanted.len()), "entity and vertices");
             (*entity, found.iter().zip(wanted).map(|(f, w)| of(f, w)).collect())
         };
-        ErrorMap { errors: found.iter().zip(reference).map(entity).collect(), scheme, unit }
+        ErrorMap { errors: found.iter().zip(reference).map(entity).collect(), unit }
     }
 
     /// Root mean square over vertices, in units of `unit`.
@@ -62,19 +56,15 @@ impl ErrorMap {
 
     /// Title of a picture of these errors.
     pub fn title(&self, reference_error: f64) -> String {
-        let what = match self.scheme {
-            Scheme::Signed => "blue: too dark, red: too bright",
-            Scheme::Absolute => "magnitude",
-        };
         format!(
-            "error of radiosity / RMS radiosity by rays from vertices; {what}; RMS {:.4}, of the rays themselves {reference_error:.4}",
+            "error of radiosity / RMS radiosity by rays from vertices; blue: too dark, red: too bright; RMS {:.4}, of the rays themselves {reference_error:.4}",
             self.rms()
         )
     }
 
     /// The colour scale that fits these errors: see [`ColorScale::fitting`].
     pub fn scale(&self) -> ColorScale {
-        ColorScale::fitting(self.scheme, self.errors.iter().flat_map(|(_, errors)| errors.iter().copied()))
+        ColorScale::fitting(Scheme::Signed, self.errors.iter().flat_map(|(_, errors)| errors.iter().copied()))
     }
 
     /// A colour per vertex by entity, for [`Frame::set_radiosity`].
@@ -133,15 +123,12 @@ mod tests {
         let reference = vec![(2, vec![[3.0, 3.0, 3.0], [4.0, 4.0, 4.0], [0.0; 3]])];
         let found = vec![(2, vec![[3.0, 3.0, 3.0], [4.5, 4.0, 3.5], [0.0, 0.0, -3.0]])];
         let unit = (25.0_f64 / 3.0).sqrt();
-        let signed = ErrorMap::new(&found, &reference, Scheme::Signed);
-        assert!((signed.unit - unit).abs() < 1e-12);
-        assert_eq!(signed.errors[0].0, 2);
+        let map = ErrorMap::new(&found, &reference);
+        assert!((map.unit - unit).abs() < 1e-12);
+        assert_eq!(map.errors[0].0, 2);
         let wanted = [0.0, 0.0, -1.0 / unit];
-        assert!(signed.errors[0].1.iter().zip(wanted).all(|(a, b)| (a - b).abs() < 1e-12), "{signed:?}");
-        let absolute = ErrorMap::new(&found, &reference, Scheme::Absolute);
-        let wanted = [0.0, (0.5_f64 / 3.0).sqrt() / unit, 3.0_f64.sqrt() / unit];
-        assert!(absolute.errors[0].1.iter().zip(wanted).all(|(a, b)| (a - b).abs() < 1e-12), "{absolute:?}");
-        let colors = absolute.colors(&absolute.scale());
+        assert!(map.errors[0].1.iter().zip(wanted).all(|(a, b)| (a - b).abs() < 1e-12), "{map:?}");
+        let colors = map.colors(&map.scale());
         assert_eq!(colors[0].1.len(), 3);
         assert_ne!(colors[0].1[0], colors[0].1[2]);
     }

@@ -5,7 +5,7 @@ use super::reference;
 use super::status::ErrorScale;
 use super::task::BackgroundTask;
 use super::viewer::{ERROR, REFERENCE, Viewer};
-use crate::asset::false_color::{NEUTRAL, Scheme};
+use crate::asset::false_color::NEUTRAL;
 use crate::error::Result;
 use crate::truth::error_map::{self, ErrorMap};
 
@@ -60,7 +60,7 @@ impl Viewer {
         {
             return Ok(());
         }
-        let map = ErrorMap::new(&error_map::radiosity(frame)?, &reference.radiosity, Scheme::Signed);
+        let map = ErrorMap::new(&error_map::radiosity(frame)?, &reference.radiosity);
         let scale = map.scale();
         frame.set_comparison(ERROR, &map.colors(&scale), NEUTRAL)?;
         let shown = ErrorScale { rms: map.rms(), limit: scale.limit };

@@ -177,9 +177,9 @@ pub fn run(bench: &Bench<'_>, folder: &Path) -> Result<StabilityOutcome> {
     }
     let origin = json!({ "origin": bench.origin, "quick": bench.quick, "seed": bench.seed });
     let outcome = StabilityOutcome { chains, trials };
-    write(&folder.join("chains.csv"), &csv(&origin, &outcome.chains))?;
-    write(&folder.join("trials.csv"), &csv(&origin, &outcome.trials))?;
-    write(&folder.join("stability.json"), &format!("{:#}\n", json!({ "origin": origin, "outcome": outcome })))?;
+    write(&folder.join("chains.csv"), csv(&origin, &outcome.chains))?;
+    write(&folder.join("trials.csv"), csv(&origin, &outcome.trials))?;
+    write(&folder.join("stability.json"), format!("{:#}\n", json!({ "origin": origin, "outcome": outcome })))?;
     Ok(outcome)
 }
 

@@ -96,11 +96,11 @@ fn write_all(bench: &Bench<'_>, folder: &Path, selection: &Selection, outcome: &
         "origin": bench.origin, "quick": bench.quick, "seed": bench.seed, "selection": selection,
         "errors": "relative to the root mean square of T0 over the judged vertices",
     });
-    write(&folder.join("budget.csv"), &csv(&origin, &outcome.budgets))?;
-    write(&folder.join("sweep.csv"), &csv(&origin, &outcome.points))?;
+    write(&folder.join("budget.csv"), csv(&origin, &outcome.budgets))?;
+    write(&folder.join("sweep.csv"), csv(&origin, &outcome.points))?;
     let rivals: Vec<Value> = outcome.comparisons.iter().flat_map(rival_rows).collect();
-    write(&folder.join("rival.csv"), &csv(&origin, &rivals))?;
-    write(&folder.join("time-error.json"), &format!("{:#}\n", json!({ "origin": origin, "outcome": outcome })))?;
+    write(&folder.join("rival.csv"), csv(&origin, &rivals))?;
+    write(&folder.join("time-error.json"), format!("{:#}\n", json!({ "origin": origin, "outcome": outcome })))?;
     Ok(())
 }
 

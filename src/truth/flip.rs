@@ -45,7 +45,7 @@ impl ColorSpace {
         [116.0 * y - 16.0, 500.0 * (x - y), 200.0 * (y - z)]
     }
 
-    fn from_opponent(&self, [y, cx, cz]: [f64; 3]) -> glam::DVec3 {
+    fn rgb_of_opponent(&self, [y, cx, cz]: [f64; 3]) -> glam::DVec3 {
         let y = (y + 16.0) / 116.0;
         self.to_rgb * (glam::DVec3::new(y + cx / 500.0, y, y - cz / 200.0) * self.white)
     }
@@ -164,7 +164,7 @@ impl Seen {
         let luminance = Plane { width, values: opponent.iter().map(|o| (o[0] + 16.0) / 116.0).collect() };
         let [y, cx, cz] = std::array::from_fn(|c| blurred(&plane(c), &SENSITIVITY[c]).values);
         let lab = |i: usize| {
-            let blurred = space.from_opponent([y[i], cx[i], cz[i]]);
+            let blurred = space.rgb_of_opponent([y[i], cx[i], cz[i]]);
             space.lab(blurred.max(glam::DVec3::ZERO).min(glam::DVec3::ONE))
         };
         Seen { lab: (0..opponent.len()).map(lab).collect(), features: features(&luminance) }

@@ -23,7 +23,7 @@ impl Sequence {
 
     /// Another sequence, which is independent of this one.
     pub fn other(&self, number: u32) -> Self {
-        Sequence::new(self.seed().into(), [number.into(), 1, 2])
+        Sequence::new(self.seed(), [number.into(), 1, 2])
     }
 
     /// A seed that is this sequence's own.

@@ -22,7 +22,7 @@ pub struct Arguments {
 #[derive(Subcommand)]
 enum Commands {
     /// Cut bakes and pictures into slices and write them, with everything that decides their bytes
-    Plan(plan::Arguments),
+    Plan(Box<plan::Arguments>),
     /// Compute one slice; return at once if its result exists and is intact
     Run(run::Arguments),
     /// Check all results and make cache files and pictures of them, or say which slices have to run again

@@ -42,7 +42,7 @@ fn positive(row: &Value, keys: &[&str]) {
 #[test]
 fn two_variants_side_by_side() {
     let Some(folder) = Folder::with_device() else { return };
-    let line = "--runs 2 --grid 65536 --occluders 2 --compare texel-packed storage --output out";
+    let line = "--runs 2 --grid 65536 --occluders 2 --variant texel-packed --variant storage --output out";
     let document = profile(&folder, line);
     positive(
         &document["ceilings"],
@@ -58,7 +58,6 @@ fn two_variants_side_by_side() {
         positive(row, &["/work/flops"]);
         assert_eq!(row["work"]["fetches"].as_u64().unwrap() > 0, name == "texel-packed");
     }
-    positive(&document["ratios"][0], &["/ratio/p10", "/ratio/median", "/ratio/p90"]);
     assert_eq!(names(&folder.at("out")), ["profile.csv", "profile.json"]);
 }
 
@@ -70,7 +69,7 @@ const FLOOR: &str = "camera = { eye = [0, 2, 3], target = [0, 0, 0] }\nenvironme
 fn a_scene_is_timed_pass_by_pass() {
     let Some(folder) = Folder::with_device() else { return };
     folder.write("floor.toml", FLOOR);
-    let line = "floor.toml --runs 2 --size 64x48 --compare texel-packed texel-shifted";
+    let line = "floor.toml --runs 2 --size 64x48 --variant texel-packed --variant texel-shifted";
     let document = profile(&folder, line);
     let rows = document["passes"].as_array().unwrap();
     assert!(
@@ -80,25 +79,8 @@ fn a_scene_is_timed_pass_by_pass() {
     );
     let passes: Vec<_> = rows.iter().map(|row| row["pass"].as_str().unwrap()).collect();
     assert_eq!(passes[..2], ["merge", "merge"]);
-    assert_eq!(passes[passes.len() - 12..], ["draw", "frame"].repeat(6));
-    rows.iter().for_each(|row| positive(row, &["/ms/median"]));
-    positive(&document["ratios"][0], &["/ratio/p10", "/ratio/median", "/ratio/p90"]);
-}
-
-#[test]
-fn a_bake_is_timed_pass_by_pass() {
-    let Some(folder) = Folder::with_device() else { return };
-    // Dented, so that its field is captured.
-    let solid = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0.2 0.2 1\nv 0.2 0.2 0.3\n\
-        f 1 2 4\nf 2 3 4\nf 3 1 4\nf 2 1 5\nf 3 2 5\nf 1 3 5\n";
-    folder.write("solid.obj", solid);
-    let document = profile(&folder, "--bake solid.obj --runs 1");
-    let rows = document["passes"].as_array().unwrap();
-    let passes: Vec<_> =
-        rows.iter().map(|row| (row["variant"].as_str().unwrap(), row["pass"].as_str().unwrap())).collect();
-    let field = ["assemble", "bake", "capture", "project"];
-    let expected = ["occlusion", "radiance"].into_iter().flat_map(|kind| field.map(|pass| (kind, pass)));
-    assert_eq!(passes, expected.chain([("transfer", "bake")]).collect::<Vec<_>>());
+    assert_eq!(passes.iter().filter(|pass| **pass == "draw").count(), 3, "ways to smooth edges: {passes:?}");
+    assert_eq!(passes.iter().filter(|pass| **pass == "frame").count(), 3, "{passes:?}");
     rows.iter().for_each(|row| positive(row, &["/ms/median"]));
 }
 

@@ -6,7 +6,7 @@ use super::editor::Editor;
 use super::history::{EditKind, Snapshot};
 use super::picker::EntityDrag;
 use crate::draw::camera::through_pixels;
-use crate::scene::Placement;
+use crate::scene::{EntityData, Placement};
 use crate::truth::ray_mesh::RayMesh;
 use glam::DVec3;
 
@@ -67,12 +67,13 @@ impl Editor {
         Some(enters_m + f64::from(hit) * radius_m)
     }
 
-    /// Whether a drag from a position moves the selected entity instead of the camera: the entity is seen there, and
-    /// occludes or emits.
+    /// Whether a drag from a position moves the selected entity instead of the camera: the entity, or another piece of the
+    /// same thing, is seen there, and it occludes or emits.
     pub fn grabs(&self, at: [f32; 2]) -> bool {
         self.selection.is_some_and(|selected| {
             let entity = &self.scene.entities[selected];
-            (entity.occludes || entity.emits) && self.hit(at).is_some_and(|(seen, _)| seen == selected)
+            let is_of_it = |seen: usize| seen == selected || self.scene.data.pieces(selected).contains(&seen);
+            (entity.occludes || entity.emits) && self.hit(at).is_some_and(|(seen, _)| is_of_it(seen))
         })
     }
 
@@ -87,8 +88,9 @@ impl Editor {
                 if self.grabs(at)
                     && let Some((entity, anchor)) = self.hit(at)
                 {
-                    let before = self.scene.data.entities[entity].clone();
-                    self.drag = Some(EntityDrag { entity, before, anchor, moved: false });
+                    let data = &self.scene.data;
+                    let before = data.pieces(entity).into_iter().map(|piece| (piece, data.entities[piece].clone()));
+                    self.drag = Some(EntityDrag { before: before.collect(), anchor, moved: false });
                 }
                 Effect::default()
             }
@@ -112,13 +114,15 @@ impl Editor {
             return Effect::default();
         }
         let by = (ray.origin + along * ray.direction - drag.anchor) * DVec3::new(1.0, 0.0, 1.0);
-        let Some(after) = edit::moved(&drag.before, by) else { return Effect::default() };
-        let entity = drag.entity;
+        let after: Option<Vec<EntityData>> = drag.before.iter().map(|(_, data)| edit::moved(data, by)).collect();
+        let Some(after) = after else { return Effect::default() };
         let joins = drag.moved;
         drag.moved = true;
-        let before = || Snapshot { entities: vec![(entity, drag.before.clone())], ..Snapshot::default() };
-        self.history.note(EditKind::Drag, Some(entity), joins, before);
-        self.scene.put_entity(entity, after);
+        let before = || Snapshot { entities: drag.before.clone(), ..Snapshot::default() };
+        self.history.note(EditKind::Drag, Some(drag.before[0].0), joins, before);
+        for ((entity, _), after) in drag.before.iter().zip(after) {
+            self.scene.put_entity(*entity, after);
+        }
         Changed { placements: true, ..Changed::default() }.into()
     }
 }

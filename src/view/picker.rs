@@ -18,10 +18,10 @@ impl Picker {
     }
 }
 
-/// An entity that is being dragged.
+/// An entity that is being dragged, and the other pieces of the same thing.
 pub(super) struct EntityDrag {
-    pub(super) entity: usize,
-    pub(super) before: EntityData,
+    /// As they were before.
+    pub(super) before: Vec<(usize, EntityData)>,
     /// The point where it was grabbed, metres.
     pub(super) anchor: DVec3,
     pub(super) moved: bool,

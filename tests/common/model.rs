@@ -242,6 +242,40 @@ pub fn room() -> Model {
     model
 }
 
+/// A board on two legs, one primitive, and specks beside them that have little area.
+pub fn bench(material: Value) -> Model {
+    let mut model = Model::default();
+    let boxes = [
+        ([-1.0, 0.5, -0.3], [1.0, 0.6, 0.3]),
+        ([-0.9, 0.0, -0.2], [-0.8, 0.5, 0.2]),
+        ([0.8, 0.0, -0.2], [0.9, 0.5, 0.2]),
+    ];
+    let mut positions = Vec::new();
+    let mut normals = Vec::new();
+    let mut indices = Vec::new();
+    for (low, high) in boxes {
+        let (own, along, corners) = cuboid(low, high);
+        let first = positions.len() as u16 / 3;
+        indices.extend(corners.iter().map(|corner| first + corner));
+        positions.extend(own);
+        normals.extend(along);
+    }
+    for speck in 0..3 {
+        let first = positions.len() as u16 / 3;
+        let x = speck as f32;
+        positions.extend([x, 1.0, 0.0, x + 0.01, 1.0, 0.0, x, 1.0, -0.01]);
+        normals.extend([0.0, 1.0, 0.0].repeat(3));
+        indices.extend([first, first + 1, first + 2]);
+    }
+    let material = model.push("materials", material);
+    let positions = model.positions(&positions);
+    let attributes = json!({ "POSITION": positions, "NORMAL": model.floats(3, &normals) });
+    let indices = model.indices(&indices);
+    let mesh = model.mesh(attributes, Some(indices), Some(material));
+    model.node(json!({ "name": "bench", "mesh": mesh }));
+    model
+}
+
 /// Three parts that move, one in another, and two lamps.
 pub fn robot() -> Model {
     let mut model = Model::default();

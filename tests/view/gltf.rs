@@ -1,6 +1,6 @@
 //! A glTF file behind the window: it moves, it can be edited, and what is saved is a scene file with its meshes.
 
-use super::model::robot;
+use super::model::{bench, robot};
 use super::picture_place;
 use glam::DVec3;
 use shadow_fields::scene::Scene;
@@ -42,4 +42,33 @@ fn a_gltf_file_is_edited_and_saved_as_a_scene_file() {
     assert_eq!(again.data.entities, editor.scene().data.entities);
     // Saved again, it overwrites what it wrote.
     editor.save(&saved).unwrap();
+}
+
+#[test]
+fn the_pieces_of_a_thing_are_dragged_together() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut model = bench(serde_json::json!({}));
+    let node = model.json["nodes"][0].clone();
+    let other = model.node(node);
+    model.json["nodes"][other]["translation"] = serde_json::json!([0, 0, -3]);
+    let path = model.write(folder.path(), "benches");
+    let mut editor = Editor::new(Scene::load(&path).unwrap(), &path);
+    let before = editor.placements();
+    let board = editor.scene().entities.iter().position(|entity| entity.name == "bench, piece 0").unwrap();
+    let (centre, _) = editor.sphere(board, &before[board]);
+    let at = picture_place(&editor, centre);
+    editor.apply(Command::Pick(at));
+    assert_eq!(editor.selection, Some(board));
+    editor.apply(Command::DragStart(at));
+    assert!(editor.apply(Command::DragTo([at[0] + 30.0, at[1]])).changed.placements);
+    let after = editor.placements();
+    let by = |entity: usize| after[entity].position - before[entity].position;
+    assert!(by(board).length() > 0.01);
+    for entity in 0..before.len() {
+        let belongs = (board..board + 4).contains(&entity);
+        assert_eq!(by(entity), if belongs { by(board) } else { glam::Vec3::ZERO }, "entity {entity}");
+    }
+    editor.apply(Command::DragEnd);
+    editor.apply(Command::Undo);
+    assert_eq!(editor.placements(), before);
 }

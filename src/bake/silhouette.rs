@@ -5,6 +5,7 @@
 //! texel and map, see [`crate::field::silhouette`]. Views of `view_px` are drawn side by side into an atlas of the
 //! farthest and the nearest depth a pixel; two dispatches reduce every view to its map.
 
+use super::polyhedron::Polyhedron;
 use super::triangles::unit_positions;
 use super::{BakeReport, Baker, Progress, hash_text, levels};
 use crate::asset::mesh::Mesh;
@@ -265,7 +266,7 @@ fn drawn_triangles<'m>(
     Ok(Cow::Owned(baker.leveled(mesh)?.within(header.level_pixels * pixel)))
 }
 
-/// Bakes the silhouette field of a mesh on the device; `progress` hears of maps. Returns the report of the bake too.
+/// Bakes the silhouette field of a mesh, on the device but for convex solids of few faces; `progress` hears of maps. Returns the report of the bake too.
 pub fn bake_silhouette(
     baker: &Baker,
     mesh: &Mesh,
@@ -278,6 +279,14 @@ pub fn bake_silhouette(
     let header = silhouette_header(mesh, options);
     header.validate()?;
     let frames = frames(mesh, &NodeGrid::new(options.cells), header.map_count());
+    if let Some(solid) = Polyhedron::new(mesh) {
+        let maps: Vec<Vec<[u8; 2]>> = frames.par_iter().map(|frame| solid.outline(frame, options.map_px)).collect();
+        progress(frames.len() as u32, frames.len() as u32);
+        let samples = frames.len() as u32;
+        let report = BakeReport { samples, total: started.elapsed(), ..BakeReport::default() };
+        let payload = payload(&header, &frames, &[maps.concat().into_flattened()]);
+        return Ok((SilhouetteField::new(header, payload)?, report));
+    }
     let triangles = drawn_triangles(baker, mesh, &header, &frames)?;
     // Sides whose maps have the same size share the pass and its buffers.
     let sizes: &[&[Side]] =

@@ -355,24 +355,6 @@ impl MeshData {
     }
 }
 
-impl Data {
-    /// The entities that are pieces of the same thing as one of them, in order: that one alone where its mesh is whole.
-    pub(crate) fn pieces(&self, entity: usize) -> Vec<usize> {
-        let own = &self.entities[entity];
-        let mesh_of = |entity: &EntityData| self.meshes.iter().find(|mesh| mesh.name == entity.mesh);
-        let Some(mesh) = mesh_of(own).filter(|mesh| mesh.piece.is_some()) else { return vec![entity] };
-        let stands_with = |other: &EntityData| {
-            (other.position, other.rotation, other.scale) == (own.position, own.rotation, own.scale)
-                && other.motion == own.motion
-        };
-        let is_cut_from_it = |other: &MeshData| {
-            other.piece.is_some() && (&other.file, other.part, other.pose) == (&mesh.file, mesh.part, mesh.pose)
-        };
-        let is_piece = |other: &EntityData| stands_with(other) && mesh_of(other).is_some_and(is_cut_from_it);
-        (0..self.entities.len()).filter(|&other| is_piece(&self.entities[other])).collect()
-    }
-}
-
 // Written by hand, because serde's flattening would accept unknown keys.
 impl<'de> Deserialize<'de> for MeshData {
     fn deserialize<D: serde::Deserializer<'de>>(source: D) -> std::result::Result<Self, D::Error> {

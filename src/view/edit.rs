@@ -1,6 +1,6 @@
-//! A move of one entity at all times: its whole motion moves with it.
+//! A move of one entity at all times: its whole motion moves with it. And what is moved with it.
 
-use crate::scene::data::EntityData;
+use crate::scene::data::{Data, EntityData, MeshData};
 use crate::scene::motion::{Motion, Node};
 use crate::scene::values::POSITION_LIMIT_M;
 use glam::{DQuat, DVec3, Vec3};
@@ -40,4 +40,20 @@ pub fn moved(entity: &EntityData, by: DVec3) -> Option<EntityData> {
         }
     }
     fits.then_some(out)
+}
+
+/// The entities that are pieces of the same thing as one of them, in order: that one alone where its mesh is whole.
+pub fn pieces(data: &Data, entity: usize) -> Vec<usize> {
+    let own = &data.entities[entity];
+    let mesh_of = |entity: &EntityData| data.meshes.iter().find(|mesh| mesh.name == entity.mesh);
+    let Some(mesh) = mesh_of(own).filter(|mesh| mesh.piece.is_some()) else { return vec![entity] };
+    let stands_with = |other: &EntityData| {
+        (other.position, other.rotation, other.scale) == (own.position, own.rotation, own.scale)
+            && other.motion == own.motion
+    };
+    let is_cut_from_it = |other: &MeshData| {
+        other.piece.is_some() && (&other.file, other.part, other.pose) == (&mesh.file, mesh.part, mesh.pose)
+    };
+    let is_piece = |other: &EntityData| stands_with(other) && mesh_of(other).is_some_and(is_cut_from_it);
+    (0..data.entities.len()).filter(|&other| is_piece(&data.entities[other])).collect()
 }

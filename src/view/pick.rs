@@ -72,7 +72,7 @@ impl Editor {
     pub fn grabs(&self, at: [f32; 2]) -> bool {
         self.selection.is_some_and(|selected| {
             let entity = &self.scene.entities[selected];
-            let is_of_it = |seen: usize| seen == selected || self.scene.data.pieces(selected).contains(&seen);
+            let is_of_it = |seen: usize| seen == selected || edit::pieces(&self.scene.data, selected).contains(&seen);
             (entity.occludes || entity.emits) && self.hit(at).is_some_and(|(seen, _)| is_of_it(seen))
         })
     }
@@ -89,7 +89,8 @@ impl Editor {
                     && let Some((entity, anchor)) = self.hit(at)
                 {
                     let data = &self.scene.data;
-                    let before = data.pieces(entity).into_iter().map(|piece| (piece, data.entities[piece].clone()));
+                    let before =
+                        edit::pieces(data, entity).into_iter().map(|piece| (piece, data.entities[piece].clone()));
                     self.drag = Some(EntityDrag { before: before.collect(), anchor, moved: false });
                 }
                 Effect::default()

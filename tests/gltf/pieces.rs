@@ -44,6 +44,13 @@ fn lamps_and_what_lets_light_through_stay_whole() {
     }
 }
 
+#[test]
+fn what_moves_stays_whole() {
+    let mut model = bench(json!({}));
+    model.animate(0, 0, "translation", "LINEAR", &[0.0, 1.0], &[0.0, 0.0, 0.0, 1.0, 0.0, 0.0]);
+    assert_eq!(benches(&load(&model).1), ["bench"]);
+}
+
 /// However a quad that glows lies in its mesh and its node, it is a rectangle of light where the file has it.
 #[test]
 fn a_quad_that_glows_is_a_rectangle_that_shines_from_both_sides() {

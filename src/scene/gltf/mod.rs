@@ -377,10 +377,12 @@ impl Builder {
         self.finish(&stage.stands, entities)
     }
 
-    /// The entities of parts and where they stand. A primitive of loose pieces becomes as many entities, since outlines
-    /// of simple shapes hold closer to them: a table is a board and its legs.
+    /// The entities of parts and where they stand. A primitive of loose pieces at rest becomes as many entities, since
+    /// outlines of simple shapes hold closer to them: a table is a board and its legs. What moves stays whole, because
+    /// one field costs a merge less than many.
     fn entities(&mut self, parts: &[(Stand, Part)]) -> Result<Vec<EntityData>> {
-        let counts: Vec<u32> = parts.iter().map(|(_, part)| self.piece_count(*part)).collect::<Result<_>>()?;
+        let counts: Vec<u32> =
+            parts.iter().map(|(stand, part)| self.piece_count(stand, *part)).collect::<Result<_>>()?;
         let cut_count: u32 = counts.iter().filter(|count| **count > 1).sum();
         let mut entities = Vec::new();
         for ((stand, whole), count) in parts.iter().zip(counts) {
@@ -399,9 +401,9 @@ impl Builder {
         Ok(entities)
     }
 
-    /// How many pieces a primitive is cut into. Lamps and surfaces that let light through stay whole, and so do the many
-    /// cards of a plant.
-    fn piece_count(&mut self, part: Part) -> Result<u32> {
+    /// Reads a primitive and tells how many pieces it is cut into. Lamps and surfaces that let light through stay whole,
+    /// and so do the many cards of a plant.
+    fn piece_count(&mut self, stand: &Stand, part: Part) -> Result<u32> {
         self.reader.read(part)?;
         let Some(Some(Primitive { shape, surface, .. })) = self.reader.primitives.get(&part.key()) else {
             return Ok(1);
@@ -409,7 +411,7 @@ impl Builder {
         let has_alpha = |paint: &Paint| paint.texture.alpha_cutoff.is_some() || paint.texture.alpha_blend;
         let passes_light = surface.opacity < 1.0 || surface.paint.as_ref().is_some_and(has_alpha);
         let is_solid = !passes_light && surface.emission == Vec3::ZERO;
-        Ok(if is_solid { shape.piece_count() } else { 1 })
+        Ok(if is_solid && stand.motion.is_empty() { shape.piece_count() } else { 1 })
     }
 
     /// The entity of a part, if it has triangles.

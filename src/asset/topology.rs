@@ -2,6 +2,7 @@
 
 use std::collections::HashMap;
 
+use super::enclose;
 use glam::{DVec3, Vec3};
 
 /// Properties of a surface on which the bake depends.
@@ -54,6 +55,14 @@ pub fn shape(positions: &[Vec3], triangles: &[[u32; 3]], centre: Vec3, radius_m:
         && pieces(&edges, triangles.len()).count == 1
         && edges.iter().all(|e| bends_outwards(e, positions, triangles, f64::from(radius_m)));
     Topology { closed, solid, convex, plane: plane(positions, f64::from(radius_m)), euler_characteristic }
+}
+
+/// Whether a few triangles of many are a convex solid.
+pub fn is_convex(positions: &[Vec3], triangles: &[[u32; 3]]) -> bool {
+    let corners: Vec<Vec3> = triangles.iter().flatten().map(|v| positions[*v as usize]).collect();
+    let (centre, radius_m) = enclose::bounding_sphere(&corners);
+    let apart: Vec<[u32; 3]> = (0..triangles.len() as u32).map(|t| [3 * t, 3 * t + 1, 3 * t + 2]).collect();
+    radius_m > 0.0 && shape(&corners, &apart, centre, radius_m).convex
 }
 
 /// Signed volume in cubic metres: the sum of the tetrahedra from `centre` to every triangle.

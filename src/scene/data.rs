@@ -324,7 +324,8 @@ pub struct MeshData {
     /// Mesh and primitive of a glTF file, counted from 0.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub part: Option<[usize; 2]>,
-    /// One of the loose pieces of the part, counted from 0. The default takes all.
+    /// One of the loose pieces of the part, counted from 0: convex solids of few triangles, and last the rest. The default
+    /// takes all.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub piece: Option<u32>,
     /// Columns of a matrix that scales, mirrors or shears the part. The default leaves it as it is.

@@ -377,9 +377,9 @@ impl Builder {
         self.finish(&stage.stands, entities)
     }
 
-    /// The entities of parts and where they stand. A primitive of loose pieces at rest becomes as many entities, since
-    /// outlines of simple shapes hold closer to them: a table is a board and its legs. What moves stays whole, because
-    /// one field costs a merge less than many.
+    /// The entities of parts and where they stand. Loose convex pieces of what rests become entities of their own, since
+    /// their outlines hold up to where they touch: a table is a board and its legs. What moves stays whole, because one
+    /// field costs a merge less than many.
     fn entities(&mut self, parts: &[(Stand, Part)]) -> Result<Vec<EntityData>> {
         let counts: Vec<u32> =
             parts.iter().map(|(stand, part)| self.piece_count(stand, *part)).collect::<Result<_>>()?;

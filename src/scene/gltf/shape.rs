@@ -15,9 +15,12 @@ use crate::asset::mesh::{Attributes, TRIANGLE_LIMIT, area_m2};
 use crate::asset::{Mesh, topology};
 use crate::error::Result;
 
-/// Most pieces that a primitive is cut into, the small ones together as one of them.
+/// Most pieces that a primitive is cut into.
 const PIECES_LIMIT: usize = 64;
-/// A piece of less than this share of the area is a small one.
+/// Most triangles of a piece that is cut off. Such a convex solid has a closed form; others are as well off together, and
+/// each would take a second to bake.
+const PIECE_TRIANGLES: usize = 64;
+/// A piece of less than this share of the area stays with the rest.
 const SMALL_PIECE: f64 = 1e-3;
 
 /// The triangles of a primitive. Where it has no normals, every triangle has vertices of its own with its own normal,
@@ -142,34 +145,34 @@ impl Shape {
             .map_err(|error| document.fail(&self.place, error))
     }
 
-    /// The number of the piece that each triangle belongs to: connected surfaces, and all small ones together. All are 0
-    /// where there are too many.
+    /// The number of the piece that each triangle belongs to: those that are cut off, and last the rest. All are 0 where
+    /// none is cut off, or too many would be.
     fn pieces(&self) -> &[u32] {
         self.pieces.get_or_init(|| {
             let numbers = topology::piece_numbers(&self.positions, &self.triangles);
-            let whole = vec![0; numbers.len()];
             let count = numbers.iter().max().map_or(0, |last| *last as usize + 1);
-            let mut areas = vec![0.0; count];
+            let mut pieces = vec![Vec::new(); count];
             for (number, triangle) in numbers.iter().zip(&self.triangles) {
-                areas[*number as usize] += area_m2(&self.positions, &[*triangle]);
+                pieces[*number as usize].push(*triangle);
             }
-            let all: f64 = areas.iter().sum();
-            let is_small = |area: f64| area < SMALL_PIECE * all;
-            let large_count = areas.iter().filter(|area| !is_small(**area)).count() as u32;
-            let small: f64 = areas.iter().filter(|area| is_small(**area)).sum();
+            let area = |triangles: &[[u32; 3]]| area_m2(&self.positions, triangles);
+            let whole = area(&self.triangles);
+            let is_cut_off = |piece: &Vec<[u32; 3]>| {
+                (4..=PIECE_TRIANGLES).contains(&piece.len())
+                    && area(piece) >= SMALL_PIECE * whole
+                    && topology::is_convex(&self.positions, piece)
+            };
+            let cut_off: Vec<bool> = pieces.iter().map(is_cut_off).collect();
+            let cut_count = cut_off.iter().filter(|is_cut_off| **is_cut_off).count();
+            let rest: f64 = pieces.iter().zip(&cut_off).filter(|(_, cut)| !**cut).map(|(piece, _)| area(piece)).sum();
             // What has nearly no area is no mesh of its own.
-            let of_small = if small > 1e-6 * all { large_count } else { 0 };
-            if large_count.max(of_small + 1) as usize > PIECES_LIMIT {
-                return whole;
+            let last = if rest > 1e-6 * whole { cut_count as u32 } else { 0 };
+            if cut_count == 0 || cut_count >= PIECES_LIMIT {
+                return vec![0; numbers.len()];
             }
-            let mut next = 0;
-            let mut renumbered = vec![of_small; count];
-            for (number, area) in renumbered.iter_mut().zip(&areas) {
-                if !is_small(*area) {
-                    *number = next;
-                    next += 1;
-                }
-            }
+            let mut renumbered = vec![last; count];
+            let own = renumbered.iter_mut().zip(&cut_off).filter(|(_, is_cut_off)| **is_cut_off);
+            own.enumerate().for_each(|(number, (piece, _))| *piece = number as u32);
             numbers.iter().map(|number| renumbered[*number as usize]).collect()
         })
     }

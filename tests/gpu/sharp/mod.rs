@@ -40,7 +40,9 @@ const HEAD: &str = "[camera]\neye = [0, 2, 5]\ntarget = [0, 0.5, 0]\n\
 
 const LAMPS: &str = "[[mesh]]\nname = \"disc\"\ndisc = { radius_m = 0.3 }\n\
     [[mesh]]\nname = \"window\"\nrectangle = { size_m = [0.4, 0.6] }\n\
+    [[mesh]]\nname = \"quad\"\nplane = { size_m = 0.5, cells = 1 }\n\
     [[mesh]]\nname = \"tube\"\nrectangle = { size_m = [1.6, 0.2] }\n";
+const UP: &str = "rotation = { axis = [0.3, 0, 1], angle_deg = -30 }\nemission = [60, 50, 40]\nreceives = false";
 const DOWN: &str = "rotation = { axis = [0.3, 0, 1], angle_deg = 150 }\nemission = [60, 50, 40]\nreceives = false";
 
 /// A scene, and what sharp lights may err by in it at most.
@@ -76,6 +78,12 @@ fn scenes() -> Vec<(&'static str, Scene, f64)> {
         ("a disc", parse(&format!("{HEAD}{LAMPS}{ball}{}", entity("disc", [1.2, 2.4, 0.8], DOWN))), 0.02),
         ("a wide disc", parse(&format!("{HEAD}{LAMPS}{ball}{}", entity("disc", [1.0, 1.5, 0.4], DOWN))), 0.02),
         ("a rectangle", parse(&format!("{HEAD}{LAMPS}{ball}{}", entity("window", [1.2, 2.4, 0.8], DOWN))), 0.02),
+        (
+            "a quad from its front",
+            parse(&format!("{HEAD}{LAMPS}{ball}{}", entity("quad", [1.2, 2.4, 0.8], DOWN))),
+            0.02,
+        ),
+        ("a quad from its back", parse(&format!("{HEAD}{LAMPS}{ball}{}", entity("quad", [1.2, 2.4, 0.8], UP))), 0.02),
         ("a tube", parse(&format!("{HEAD}{LAMPS}{ball}{}", entity("tube", [0.9, 2.1, 0.2], DOWN))), 0.03),
         (
             "a ring that glows",

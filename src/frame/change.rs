@@ -118,7 +118,7 @@ impl Frame {
             self.forget();
         }
         if uses("merge.comp") {
-            self.merge.rebuild(&self.device, &self.library)?;
+            self.merge = CompiledMerge::new(&self.device, &self.library, self.merge.permutation)?;
             self.forget();
         }
         Ok(())

@@ -43,7 +43,7 @@ use crate::scene_buffers::{SceneBuffers, limits};
 use crate::shaders::Library;
 use crate::sharp::{self, Sharp, SharpPermutation};
 use ash::vk;
-use permutation::{CompiledMerge, PixelShading, permutation, usable};
+use permutation::{CompiledMerge, permutation, pixel_shading, usable};
 use picture::FramePicture;
 use pixel::PixelChains;
 use prepare::ClusterWork;
@@ -89,8 +89,8 @@ pub struct Frame {
     sharp: Option<Sharp>,
     work: ClusterWork,
     sky: SkyLight,
-    /// Where pictures evaluate sharp lights.
-    pixels: PixelShading,
+    /// How pixels evaluate sharp lights themselves, where pictures want it.
+    pixels: Option<SharpPermutation>,
     /// Chains of sharp lights for pixels, once a picture evaluates any.
     chains: Option<PixelChains>,
     radiosity: RadiosityBuffers,
@@ -151,8 +151,8 @@ impl Frame {
             lists.set_near(std::mem::take(&mut near[index]), 2.0 * buffers.surface(index).reach_m);
         }
         let sharp = sharp.map(|wanted| wanted.fitting(device, buffers.sharp(), radiosity.soft()));
-        let pixels = PixelShading::new(device, &options, &buffers, radiosity.soft(), sharp);
-        if options.shading == Some(Shading::Pixel) && sharp.is_some() && pixels.pixels().is_none() {
+        let pixels = pixel_shading(device, &options, &buffers, radiosity.soft(), sharp);
+        if options.shading == Some(Shading::Pixel) && sharp.is_some() && pixels.is_none() {
             log::warn!(
                 "no pixel evaluates lights: the device's texel buffers cannot hold the silhouette fields or the light of all vertices"
             );
@@ -183,11 +183,11 @@ impl Frame {
             bounce.set_albedos(&albedos(&scene))?;
             radiosity.keep_direct()?;
         }
-        let edges = pixels.pixels().is_some();
+        let edges = pixels.is_some();
         let sharp =
             sharp.map(|fitting| Sharp::new(device, library, SharpPermutation { edges, ..fitting })).transpose()?;
         let highlights = sharp.as_ref().map(|sharp| sharp.permutation);
-        let lights = PictureLights { pixels: pixels.pixels(), highlights: highlights.as_ref() };
+        let lights = PictureLights { pixels: pixels.as_ref(), highlights: highlights.as_ref() };
         let entity_room = entity_count.max(merge.permutation.entity_limit as usize);
         let mut sky = SkyLight::new(device, options.bake.bands)?;
         sky.write(&scene, options.bake.bands)?;

@@ -26,12 +26,6 @@ impl CompiledMerge {
     pub fn new(device: &Arc<Device>, library: &Library, permutation: MergePermutation) -> Result<Self> {
         Ok(CompiledMerge { pass: Merge::new(device, library, permutation)?, permutation })
     }
-
-    /// Compiles its shader anew, from files that have changed.
-    pub fn rebuild(&mut self, device: &Arc<Device>, library: &Library) -> Result<()> {
-        self.pass = Merge::new(device, library, self.permutation)?;
-        Ok(())
-    }
 }
 
 /// The permutation with its variant less the texel views or uniform blocks that cannot hold the scene.
@@ -93,37 +87,19 @@ pub(super) fn sharp(
     })
 }
 
-/// Where pictures evaluate sharp lights.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) enum PixelShading {
-    /// At vertices alone; pixels interpolate.
-    Vertices,
-    /// Also at pixels that a shadow's edge comes near, by shaders of this permutation.
-    Pixels(SharpPermutation),
-}
-
-impl PixelShading {
-    /// Decides it for pictures with these options; `sharp` is the permutation of the pass of sharp lights, where the
-    /// scene has any.
-    pub fn new(
-        device: &Device,
-        options: &Options,
-        buffers: &SceneBuffers,
-        soft: &Buffer,
-        sharp: Option<SharpPermutation>,
-    ) -> Self {
-        let [nodes, cells, _] = buffers.sharp();
-        let wants = options.shading.unwrap_or_else(|| Shading::usual(options.antialias)) == Shading::Pixel;
-        match sharp {
-            Some(sharp) if wants && SharpPermutation::fits_views(device, [nodes, cells, soft]) => Self::Pixels(sharp),
-            _ => Self::Vertices,
-        }
-    }
-
-    /// The permutation of the shaders of these pixels, if any evaluates lights.
-    pub fn pixels(&self) -> Option<&SharpPermutation> {
-        if let Self::Pixels(sharp) = self { Some(sharp) } else { None }
-    }
+/// The permutation of the shaders of pixels that evaluate sharp lights themselves, near the edges of shadows; `None`
+/// where pixels interpolate what vertices evaluate. `sharp` is the permutation of the pass of sharp lights, where the
+/// scene has any.
+pub(super) fn pixel_shading(
+    device: &Device,
+    options: &Options,
+    buffers: &SceneBuffers,
+    soft: &Buffer,
+    sharp: Option<SharpPermutation>,
+) -> Option<SharpPermutation> {
+    let [nodes, cells, _] = buffers.sharp();
+    let wants = options.shading.unwrap_or_else(|| Shading::usual(options.antialias)) == Shading::Pixel;
+    sharp.filter(|_| wants && SharpPermutation::fits_views(device, [nodes, cells, soft]))
 }
 
 /// Whether any light of the scene meets the chains of the merge. The sky does in any case.

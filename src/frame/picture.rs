@@ -1,6 +1,6 @@
 //! Pictures of a frame: prepared, drawn into images of one size, read back.
 
-use super::permutation::PixelShading;
+use super::permutation::pixel_shading;
 use super::record::PictureWork;
 use super::room::READBACK_PIXEL_BYTES;
 use super::viewport::Viewport;
@@ -110,8 +110,8 @@ impl Frame {
     /// Makes pictures with these options from now on. Returns the pass that made them so far.
     pub(super) fn set_pictures(&mut self, options: Options, finish: Finish) -> Result<Draw> {
         let sharp = self.sharp.as_ref().map(|sharp| sharp.permutation);
-        let pixels = PixelShading::new(&self.device, &options, &self.buffers, self.radiosity.soft(), sharp);
-        let lights = PictureLights { pixels: pixels.pixels(), highlights: sharp.as_ref() };
+        let pixels = pixel_shading(&self.device, &options, &self.buffers, self.radiosity.soft(), sharp);
+        let lights = PictureLights { pixels: pixels.as_ref(), highlights: sharp.as_ref() };
         let draw = draw(&self.device, &self.library, &options, finish, lights)?;
         self.options = options;
         self.pixels = pixels;
@@ -120,7 +120,7 @@ impl Frame {
 
     /// Input of pixels that evaluate sharp lights in a viewport.
     fn pixel_light(&self, viewport: &Viewport) -> Option<PixelLight<'_>> {
-        self.pixels.pixels()?;
+        self.pixels?;
         let chains = self.chains.as_ref().filter(|chains| chains.is_ready())?;
         viewport.shows_light().then(|| PixelLight {
             entities: &chains.entities,

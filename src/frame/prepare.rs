@@ -3,7 +3,7 @@
 //! read, in buffers of that flight's own.
 
 use super::Frame;
-use super::permutation::{CompiledMerge, PixelShading};
+use super::permutation::CompiledMerge;
 use super::pixel::PixelChains;
 use super::viewport::{RadiositySource, Viewport};
 use crate::asset::edges::Edges;
@@ -126,7 +126,7 @@ impl Frame {
 
     /// The chains of the time that was merged last, for pictures whose pixels evaluate sharp lights.
     fn prepare_chains(&mut self) -> Result<()> {
-        if self.pixels == PixelShading::Vertices || !self.work.lists.is_updated() {
+        if self.pixels.is_none() || !self.work.lists.is_updated() {
             return Ok(());
         }
         let chains = match &mut self.chains {
@@ -189,7 +189,7 @@ impl Frame {
     /// Has the pass of sharp lights mark the edges of shadows where pixels by now read the marks, and leave them out
     /// where none does. Where they are new, every cluster is merged again.
     fn fit_edges(&mut self) -> Result<()> {
-        let edges = self.pixels.pixels().is_some();
+        let edges = self.pixels.is_some();
         let Some(sharp) = self.sharp.as_mut().filter(|sharp| sharp.permutation.edges != edges) else { return Ok(()) };
         *sharp = Sharp::new(&self.device, &self.library, SharpPermutation { edges, ..sharp.permutation })?;
         if edges {

@@ -226,11 +226,8 @@ impl<'m> Reader<'m> {
             StorageClass::Workgroup => out.shared_bytes += self.size_bytes(target),
             StorageClass::Input => {
                 if let Some(location) = self.decoration(result, Decoration::Location) {
-                    let components = match self.definitions[&target].class.opcode {
-                        Op::TypeVector => literal(self.definitions[&target].operands.get(1)),
-                        _ => 1,
-                    };
-                    out.inputs.push(VertexInput { location: literal(location.first()), components });
+                    let location = literal(location.first());
+                    out.inputs.push(VertexInput { location, components: self.components(target) });
                 }
             }
             StorageClass::StorageBuffer | StorageClass::Uniform | StorageClass::UniformConstant => {
@@ -243,8 +240,7 @@ impl<'m> Reader<'m> {
 
     fn binding(&self, variable: u32, target: u32, class: StorageClass) -> Result<Binding> {
         let definition = self.definitions[&target];
-        let own = self.name(variable);
-        let name = if own.is_empty() { self.name(target) } else { own }.to_owned();
+        let name = self.variable_name(variable);
         let set = self.decoration(variable, Decoration::DescriptorSet).map_or(0, |o| literal(o.first()));
         if set != 0 {
             return Err(Error::Failed(format!("{name} is in descriptor set {set}; all bindings are in set 0")));

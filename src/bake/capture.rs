@@ -13,7 +13,7 @@ pub use super::model::Model;
 use super::raster::{Raster, RasterFaces, face_axes};
 use crate::error::{Error, Result};
 use crate::field::FieldKind;
-use crate::gpu::{Access, Buffer, Commands, Device, GraphicsPipeline, GraphicsState, Image, ImageShape, Keeps, Target};
+use crate::gpu::{Access, Buffer, Commands, Device, GraphicsPipeline, GraphicsState, Image, ImageShape, Target};
 use crate::sh::cube::{FACE_COUNT, face_basis, texel_st};
 use crate::shaders::{Library, ShaderPermutation};
 use ash::vk;
@@ -155,13 +155,10 @@ impl Capture {
     ) -> Result<GraphicsPipeline> {
         let [vertex, fragment] = Self::rows(kind);
         let state = GraphicsState {
-            color,
             depth: (kind == FieldKind::Radiance).then_some(vk::Format::D32_SFLOAT),
-            samples: 1,
             // A cube face is a mirror image, which turns every triangle over, so FRONT removes the object's back faces.
             cull: if model.closed { vk::CullModeFlags::FRONT } else { vk::CullModeFlags::NONE },
-            keeps: Keeps::Last,
-            nearer_steps: 0.0,
+            ..GraphicsState::plain(color)
         };
         GraphicsPipeline::new(device, "capture", &library.shader(&vertex)?, &library.shader(&fragment)?, state)
     }

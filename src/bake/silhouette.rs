@@ -186,14 +186,7 @@ impl Silhouette {
         let edge = atlas_columns * view_px;
         let shape = ImageShape { format: vk::Format::R16G16_SFLOAT, width: edge, height: edge, samples: 1 };
         let [vertex, fragment, columns, rows] = Self::permutations(map_px, view_px, atlas_columns);
-        let state = GraphicsState {
-            color: shape.format,
-            depth: None,
-            samples: 1,
-            cull: vk::CullModeFlags::NONE,
-            keeps: Keeps::Largest,
-            nearer_steps: 0.0,
-        };
+        let state = GraphicsState { keeps: Keeps::Largest, ..GraphicsState::plain(shape.format) };
         let vertex = library.shader(&vertex)?;
         let fragment = library.shader(&fragment)?;
         let reduce = |name, row| ComputePipeline::new(device, name, &library.shader(row)?);

@@ -11,7 +11,7 @@ use crate::asset::enclose::around_spheres;
 use crate::error::Result;
 use crate::gpu::{
     Access, Bind, Buffer, BufferKind, Commands, ComputePipeline, Device, GraphicsPipeline, GraphicsState, Image,
-    ImageShape, Keeps, Target, Timing,
+    ImageShape, Target, Timing,
 };
 use crate::scene::{Placement, Scene};
 use crate::shaders::{Library, ShaderPermutation};
@@ -125,14 +125,8 @@ impl ShadowMaps {
         let surrounded = lights(scene, placements).iter().any(|light| light.views.len() > 1);
         let [width, height] = if surrounded { [3 * map_px, 2 * map_px] } else { [map_px; 2] };
         let image = |name, format| Image::new(device, name, ImageShape { format, width, height, samples: 1 });
-        let state = GraphicsState {
-            color: vk::Format::R32_SFLOAT,
-            depth: Some(vk::Format::D32_SFLOAT),
-            samples: 1,
-            cull: vk::CullModeFlags::NONE,
-            keeps: Keeps::Last,
-            nearer_steps: 0.0,
-        };
+        let depth = Some(vk::Format::D32_SFLOAT);
+        let state = GraphicsState { depth, ..GraphicsState::plain(vk::Format::R32_SFLOAT) };
         let mesh = |mesh: &Arc<Mesh>| {
             let positions: Vec<[f32; 3]> = mesh.positions.iter().map(|p| p.to_array()).collect();
             let positions = Buffer::with_data(device, "shadow map positions", &positions)?;

@@ -24,8 +24,7 @@ use crate::draw::triangles::{Detail, DrawTriangles, DrawnTriangles};
 use crate::error::Result;
 use crate::gloss::DrawnReflections;
 use crate::gpu::{
-    Access, Buffer, Commands, Device, Drawing, GraphicsPipeline, GraphicsState, Image, ImageShape, Keeps, Target,
-    Texture,
+    Access, Buffer, Commands, Device, Drawing, GraphicsPipeline, GraphicsState, Image, ImageShape, Target, Texture,
 };
 use crate::lists::sight::{Sight, TriangleRun};
 use crate::shaders::{Library, ShaderPermutation};
@@ -70,9 +69,7 @@ impl DrawnMesh {
         }
         DrawnTriangles::new(device, mesh, order, &place, !is_plain).map(DrawnMesh::Triangles)
     }
-}
 
-impl DrawnMesh {
     /// Ranges of indices that have to be drawn, in order: all of them, or those of the runs that may be seen.
     pub fn seen(&self, sight: Option<&Sight>) -> Vec<Range<u32>> {
         let may_see = |faces: &TriangleRun| sight.is_none_or(|sight| sight.may_see(faces));
@@ -254,14 +251,7 @@ impl Draw {
         let samples = antialias.samples(device);
         let color = if finish == Finish::Display { SHOWN } else { COLOR };
         let shape = ImageShape { format: color, width, height, samples: 1 };
-        let state = GraphicsState {
-            color,
-            depth: Some(DEPTH),
-            samples,
-            cull: vk::CullModeFlags::NONE,
-            keeps: Keeps::Last,
-            nearer_steps: 0.0,
-        };
+        let state = GraphicsState { depth: Some(DEPTH), samples, ..GraphicsState::plain(color) };
         let display = finish == Finish::Display;
         let maker = PipelineMaker {
             device: device.clone(),

@@ -4,7 +4,7 @@
 
 use crate::asset::picture::srgb_from_linear;
 use crate::error::Result;
-use crate::gpu::{Bind, Device, Drawing, GraphicsPipeline, GraphicsState, Image, Keeps};
+use crate::gpu::{Bind, Device, Drawing, GraphicsPipeline, GraphicsState, Image};
 use crate::shaders::{Library, ShaderPermutation};
 use ash::vk;
 use bytemuck::{Pod, Zeroable};
@@ -25,17 +25,9 @@ pub struct Show {
 impl Show {
     /// For targets of `format`; `encodes_srgb` as the format is.
     pub fn new(device: &Arc<Device>, library: &Library, format: vk::Format, encodes_srgb: bool) -> Result<Self> {
-        let state = GraphicsState {
-            color: format,
-            depth: None,
-            samples: 1,
-            cull: vk::CullModeFlags::NONE,
-            keeps: Keeps::Last,
-            nearer_steps: 0.0,
-        };
         let vertex = library.shader(&ShaderPermutation::new("show.vert", 4))?;
         let fragment = library.shader(&ShaderPermutation::new("show.frag", 4))?;
-        let pipeline = GraphicsPipeline::new(device, "show", &vertex, &fragment, state)?;
+        let pipeline = GraphicsPipeline::new(device, "show", &vertex, &fragment, GraphicsState::plain(format))?;
         Ok(Show { pipeline, encode: !encodes_srgb })
     }
 

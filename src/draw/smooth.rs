@@ -12,12 +12,9 @@
 use crate::asset::edges::Line;
 use crate::draw::DrawnViewport;
 use crate::error::Result;
-use crate::gpu::{
-    Access, Bind, Commands, Device, GraphicsPipeline, GraphicsState, Image, ImageShape, Keeps, Target, Upload,
-};
+use crate::gpu::{Access, Bind, Commands, Device, GraphicsPipeline, GraphicsState, Image, ImageShape, Target, Upload};
 use crate::layout::TAG_STEP;
 use crate::shaders::{Library, ShaderPermutation};
-use ash::vk;
 use bytemuck::{Pod, Zeroable};
 use glam::{DVec2, DVec3, IVec2};
 use std::sync::Arc;
@@ -145,14 +142,7 @@ impl Smooth {
 
     /// For pictures of a shape. `display` says that they are encoded for a screen.
     pub fn new(device: &Arc<Device>, library: &Library, shape: ImageShape, display: bool) -> Result<Self> {
-        let state = GraphicsState {
-            color: shape.format,
-            depth: None,
-            samples: 1,
-            cull: vk::CullModeFlags::NONE,
-            keeps: Keeps::Last,
-            nearer_steps: 0.0,
-        };
+        let state = GraphicsState::plain(shape.format);
         let vertex = library.shader(&ShaderPermutation::new("smooth.vert", 4))?;
         let fragment = library.shader(&Self::fragment(display))?;
         Ok(Smooth {

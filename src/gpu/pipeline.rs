@@ -199,6 +199,14 @@ pub struct GraphicsState {
     pub nearer_steps: f32,
 }
 
+impl GraphicsState {
+    /// One sample of that format without depth: all triangles are drawn, and the last one stays.
+    pub fn plain(color: vk::Format) -> Self {
+        let cull = vk::CullModeFlags::NONE;
+        GraphicsState { color, depth: None, samples: 1, cull, keeps: Keeps::Last, nearer_steps: 0.0 }
+    }
+}
+
 /// A vertex and a fragment shader, ready to draw indexed triangles. Vertex input `location` reads tightly packed floats
 /// from the vertex buffer bound at the same number.
 pub struct GraphicsPipeline {

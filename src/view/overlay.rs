@@ -64,8 +64,7 @@ pub struct Overlay {
 }
 
 fn pipeline(device: &Arc<Device>, library: &Library, color: vk::Format) -> Result<GraphicsPipeline> {
-    let cull = vk::CullModeFlags::NONE;
-    let state = GraphicsState { color, depth: None, samples: 1, cull, keeps: Keeps::Over, nearer_steps: 0.0 };
+    let state = GraphicsState { keeps: Keeps::Over, ..GraphicsState::plain(color) };
     let vertex = library.shader(&ShaderPermutation::new("overlay.vert", 4))?;
     let fragment = library.shader(&ShaderPermutation::new("overlay.frag", 4))?;
     GraphicsPipeline::new(device, "overlay", &vertex, &fragment, state)

@@ -120,7 +120,11 @@ impl<'r> Commands<'r> {
     /// visible. llvmpipe takes a timestamp when it next rasterises or meets a barrier, not at its place among
     /// dispatches.
     fn timestamp_barrier(&self, stage: vk::PipelineStageFlags2) {
-        let barriers = [vk::MemoryBarrier2::default().src_stage_mask(stage).dst_stage_mask(stage)];
+        self.memory_barrier(vk::MemoryBarrier2::default().src_stage_mask(stage).dst_stage_mask(stage));
+    }
+
+    fn memory_barrier(&self, barrier: vk::MemoryBarrier2<'_>) {
+        let barriers = [barrier];
         let info = vk::DependencyInfo::default().memory_barriers(&barriers);
         // SAFETY: the command buffer is recording and outside a render pass.
         unsafe { self.recording.device.handle.cmd_pipeline_barrier2(self.recording.buffer, &info) };
@@ -137,14 +141,13 @@ impl<'r> Commands<'r> {
             return;
         }
         self.tracker.barrier(from, to, None);
-        let barriers = [vk::MemoryBarrier2::default()
-            .src_stage_mask(from.stage())
-            .src_access_mask(from.mask())
-            .dst_stage_mask(to.stage())
-            .dst_access_mask(to.mask())];
-        let info = vk::DependencyInfo::default().memory_barriers(&barriers);
-        // SAFETY: the command buffer is recording and outside a render pass.
-        unsafe { self.recording.device.handle.cmd_pipeline_barrier2(self.recording.buffer, &info) };
+        self.memory_barrier(
+            vk::MemoryBarrier2::default()
+                .src_stage_mask(from.stage())
+                .src_access_mask(from.mask())
+                .dst_stage_mask(to.stage())
+                .dst_access_mask(to.mask()),
+        );
     }
 
     /// As [`Commands::barrier`] for one image, which moves to the layout that `to` needs. With `from` of `None` its
@@ -291,18 +294,8 @@ impl<'r> Commands<'r> {
         let pass = self.pass_name();
         self.tracker.use_image(from.id, &from.name, Access::TransferRead, &pass);
         self.tracker.use_image(to.id, &to.name, Access::TransferWrite, &pass);
-        let range = whole(from.shape.format);
-        let layers = vk::ImageSubresourceLayers {
-            aspect_mask: range.aspect_mask,
-            mip_level: 0,
-            base_array_layer: 0,
-            layer_count: 1,
-        };
-        let region = vk::ImageCopy::default().src_subresource(layers).dst_subresource(layers).extent(vk::Extent3D {
-            width: from.shape.width,
-            height: from.shape.height,
-            depth: 1,
-        });
+        let vk::BufferImageCopy { image_subresource: layers, image_extent, .. } = packed(from);
+        let region = vk::ImageCopy::default().src_subresource(layers).dst_subresource(layers).extent(image_extent);
         // SAFETY: both are borrowed until the commands have run; the layouts are those of the accesses (tracked).
         unsafe {
             self.recording.device.handle.cmd_copy_image(
@@ -337,14 +330,13 @@ impl<'r> Commands<'r> {
 
     /// Barrier between all that was submitted to the queue before and all commands that follow in this recording.
     pub fn after_flights(&mut self) {
-        let barriers = [vk::MemoryBarrier2::default()
-            .src_stage_mask(vk::PipelineStageFlags2::ALL_COMMANDS)
-            .src_access_mask(vk::AccessFlags2::MEMORY_WRITE)
-            .dst_stage_mask(vk::PipelineStageFlags2::ALL_COMMANDS)
-            .dst_access_mask(vk::AccessFlags2::MEMORY_READ | vk::AccessFlags2::MEMORY_WRITE)];
-        let info = vk::DependencyInfo::default().memory_barriers(&barriers);
-        // SAFETY: the command buffer is recording and outside a render pass.
-        unsafe { self.recording.device.handle.cmd_pipeline_barrier2(self.recording.buffer, &info) };
+        self.memory_barrier(
+            vk::MemoryBarrier2::default()
+                .src_stage_mask(vk::PipelineStageFlags2::ALL_COMMANDS)
+                .src_access_mask(vk::AccessFlags2::MEMORY_WRITE)
+                .dst_stage_mask(vk::PipelineStageFlags2::ALL_COMMANDS)
+                .dst_access_mask(vk::AccessFlags2::MEMORY_READ | vk::AccessFlags2::MEMORY_WRITE),
+        );
     }
 
     /// Asks the tracker for its verdict and gives up the borrows.

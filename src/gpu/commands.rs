@@ -8,7 +8,7 @@ use super::access::{Access, Tracker};
 use super::bind::Bind;
 use super::device::Device;
 use super::flight::{Flight, MAX_PASSES, Recording, Signals, Timing};
-use super::image::{Image, whole};
+use super::image::Image;
 use super::memory::{Buffer, BufferKind};
 use super::pipeline::ComputePipeline;
 use crate::error::{Error, Result};
@@ -19,10 +19,10 @@ use std::marker::PhantomData;
 use std::ops::Range;
 use std::sync::Arc;
 
-/// The whole of an image beside a buffer with tightly packed rows.
-fn packed(image: &Image) -> vk::BufferImageCopy {
+/// The first level of an image beside a buffer with tightly packed rows.
+pub(super) fn packed(image: &Image) -> vk::BufferImageCopy {
     let layers = vk::ImageSubresourceLayers {
-        aspect_mask: whole(image.shape.format).aspect_mask,
+        aspect_mask: image.whole().aspect_mask,
         mip_level: 0,
         base_array_layer: 0,
         layer_count: 1,
@@ -168,7 +168,7 @@ impl<'r> Commands<'r> {
         };
         let barriers = [vk::ImageMemoryBarrier2::default()
             .image(image.raw())
-            .subresource_range(whole(image.shape.format))
+            .subresource_range(image.whole())
             .old_layout(layout)
             .new_layout(to.layout())
             .src_stage_mask(stage)

@@ -48,7 +48,8 @@ impl Drop for ImageHandle {
 /// A two-dimensional image that passes draw into and read.
 pub struct Image {
     handle: ImageHandle,
-    _memory: Option<Allocation>,
+    memory: Option<Allocation>,
+    levels: u32,
     /// Format and size.
     pub shape: ImageShape,
     /// Name shown in messages and debuggers.
@@ -73,11 +74,22 @@ impl Image {
             (false, true) => Use::COLOR_ATTACHMENT,
             (false, false) => Use::COLOR_ATTACHMENT | Use::SAMPLED | Use::TRANSFER_SRC | Use::TRANSFER_DST,
         };
+        Self::with_levels(device, name, shape, 1, usage)
+    }
+
+    /// An image with so many levels of detail, for some usage.
+    pub(super) fn with_levels(
+        device: &Arc<Device>,
+        name: &str,
+        shape: ImageShape,
+        levels: u32,
+        usage: vk::ImageUsageFlags,
+    ) -> Result<Self> {
         let create = vk::ImageCreateInfo::default()
             .image_type(vk::ImageType::TYPE_2D)
             .format(shape.format)
             .extent(vk::Extent3D { width: shape.width, height: shape.height, depth: 1 })
-            .mip_levels(1)
+            .mip_levels(levels)
             .array_layers(1)
             .samples(vk::SampleCountFlags::from_raw(shape.samples))
             .usage(usage);
@@ -90,7 +102,7 @@ impl Image {
         let memory = Allocation::new(device, name, needs, BufferKind::Device.preferences())?;
         // SAFETY: fresh image and memory of sufficient size.
         unsafe { device.handle.bind_image_memory(image, memory.handle, 0) }.checked("vkBindImageMemory", name)?;
-        Self::with_view(handle, Some(memory), name, shape)
+        Self::with_view(handle, Some(memory), name, shape, levels)
     }
 
     /// Wraps an image of a swapchain and keeps the swapchain alive.
@@ -104,21 +116,27 @@ impl Image {
         let name = "window";
         device.name(image, name);
         let handle = ImageHandle { device: device.clone(), image, view: vk::ImageView::null(), owner: Some(owner) };
-        Self::with_view(handle, None, name, shape)
+        Self::with_view(handle, None, name, shape, 1)
     }
 
-    fn with_view(mut handle: ImageHandle, memory: Option<Allocation>, name: &str, shape: ImageShape) -> Result<Self> {
+    fn with_view(
+        mut handle: ImageHandle,
+        memory: Option<Allocation>,
+        name: &str,
+        shape: ImageShape,
+        levels: u32,
+    ) -> Result<Self> {
         let device = handle.device.clone();
         let view = vk::ImageViewCreateInfo::default()
             .image(handle.image)
             .view_type(vk::ImageViewType::TYPE_2D)
             .format(shape.format)
-            .subresource_range(whole(shape.format));
+            .subresource_range(whole(shape.format, levels));
         // SAFETY: the image is alive and has its memory; the view is destroyed by `ImageHandle`.
         handle.view = unsafe { device.handle.create_image_view(&view, None) }.checked("vkCreateImageView", name)?;
         device.name(handle.view, name);
         let id = device.next_resource.fetch_add(1, Ordering::Relaxed);
-        Ok(Image { handle, _memory: memory, shape, name: name.to_owned(), id })
+        Ok(Image { handle, memory, levels, shape, name: name.to_owned(), id })
     }
 
     pub(super) fn raw(&self) -> vk::Image {
@@ -128,16 +146,25 @@ impl Image {
     pub(super) fn view(&self) -> vk::ImageView {
         self.handle.view
     }
+
+    /// All levels of its one layer.
+    pub(super) fn whole(&self) -> vk::ImageSubresourceRange {
+        whole(self.shape.format, self.levels)
+    }
+
+    /// Device memory, bytes; 0 for an image of a swapchain.
+    pub(super) fn memory_bytes(&self) -> u64 {
+        self.memory.as_ref().map_or(0, |memory| memory.size_bytes)
+    }
 }
 
-/// The one mip level and layer of an image of `format`.
-pub(super) fn whole(format: vk::Format) -> vk::ImageSubresourceRange {
+fn whole(format: vk::Format, levels: u32) -> vk::ImageSubresourceRange {
     let aspect =
         if format == vk::Format::D32_SFLOAT { vk::ImageAspectFlags::DEPTH } else { vk::ImageAspectFlags::COLOR };
     vk::ImageSubresourceRange {
         aspect_mask: aspect,
         base_mip_level: 0,
-        level_count: 1,
+        level_count: levels,
         base_array_layer: 0,
         layer_count: 1,
     }

@@ -41,6 +41,7 @@ impl BufferKind {
 pub(super) struct Allocation {
     device: Arc<Device>,
     pub(super) handle: vk::DeviceMemory,
+    pub(super) size_bytes: u64,
     host_coherent: bool,
 }
 
@@ -71,7 +72,8 @@ impl Allocation {
         let handle = unsafe { device.handle.allocate_memory(&allocate, None) }.checked("vkAllocateMemory", name)?;
         device.name(handle, name);
         let coherent = vk::MemoryPropertyFlags::HOST_VISIBLE | vk::MemoryPropertyFlags::HOST_COHERENT;
-        Ok(Allocation { device: device.clone(), handle, host_coherent: types[index].property_flags.contains(coherent) })
+        let host_coherent = types[index].property_flags.contains(coherent);
+        Ok(Allocation { device: device.clone(), handle, size_bytes: needs.size, host_coherent })
     }
 }
 

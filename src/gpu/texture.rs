@@ -2,9 +2,10 @@
 
 use super::Checked;
 use super::access::Access;
-use super::commands::Commands;
+use super::commands::{Commands, packed};
 use super::device::Device;
-use super::memory::{Allocation, Buffer, BufferKind};
+use super::image::{Image, ImageShape};
+use super::memory::{Buffer, BufferKind};
 use crate::error::Result;
 use ash::vk;
 use std::sync::Arc;
@@ -19,31 +20,22 @@ pub struct Level<'t> {
     pub bytes: &'t [u8],
 }
 
-/// Destroys a texture's handles before its memory is freed.
-struct TextureHandle {
-    device: Arc<Device>,
-    image: vk::Image,
-    view: vk::ImageView,
-    sampler: vk::Sampler,
-}
+/// Destroys a sampler, which no submission uses then.
+struct Sampler(Arc<Device>, vk::Sampler);
 
-impl Drop for TextureHandle {
+impl Drop for Sampler {
     fn drop(&mut self) {
-        self.device.settle();
+        self.0.settle();
         // SAFETY: recordings that use the texture borrow it until they are submitted, and no submission is under way
-        // (settled). Null handles are ignored.
-        unsafe {
-            self.device.handle.destroy_sampler(self.sampler, None);
-            self.device.handle.destroy_image_view(self.view, None);
-            self.device.handle.destroy_image(self.image, None);
-        }
+        // (settled).
+        unsafe { self.0.handle.destroy_sampler(self.1, None) };
     }
 }
 
 /// A picture that shaders sample, bilinear and of the nearest level.
 pub struct Texture {
-    handle: TextureHandle,
-    _memory: Allocation,
+    sampler: Sampler,
+    image: Image,
     /// Device memory, bytes.
     pub size_bytes: u64,
 }
@@ -58,32 +50,9 @@ impl Texture {
         wrap: [vk::SamplerAddressMode; 2],
     ) -> Result<Self> {
         let [first, ..] = levels else { unreachable!("a texture has a level") };
-        let create = vk::ImageCreateInfo::default()
-            .image_type(vk::ImageType::TYPE_2D)
-            .format(format)
-            .extent(vk::Extent3D { width: first.width, height: first.height, depth: 1 })
-            .mip_levels(levels.len() as u32)
-            .array_layers(1)
-            .samples(vk::SampleCountFlags::TYPE_1)
-            .usage(vk::ImageUsageFlags::SAMPLED | vk::ImageUsageFlags::TRANSFER_DST);
-        // SAFETY: destroyed by `TextureHandle`.
-        let image = unsafe { device.handle.create_image(&create, None) }.checked("vkCreateImage", name)?;
-        let null = vk::ImageView::null();
-        let mut handle = TextureHandle { device: device.clone(), image, view: null, sampler: vk::Sampler::null() };
-        device.name(image, name);
-        // SAFETY: the handle is alive.
-        let needs = unsafe { device.handle.get_image_memory_requirements(image) };
-        let memory = Allocation::new(device, name, needs, BufferKind::Device.preferences())?;
-        // SAFETY: fresh image and memory of sufficient size.
-        unsafe { device.handle.bind_image_memory(image, memory.handle, 0) }.checked("vkBindImageMemory", name)?;
-        let view = vk::ImageViewCreateInfo::default()
-            .image(image)
-            .view_type(vk::ImageViewType::TYPE_2D)
-            .format(format)
-            .subresource_range(all(levels.len()));
-        // SAFETY: the image is alive and has its memory; the view is destroyed by `TextureHandle`.
-        handle.view = unsafe { device.handle.create_image_view(&view, None) }.checked("vkCreateImageView", name)?;
-        device.name(handle.view, name);
+        let shape = ImageShape { format, width: first.width, height: first.height, samples: 1 };
+        let usage = vk::ImageUsageFlags::SAMPLED | vk::ImageUsageFlags::TRANSFER_DST;
+        let image = Image::with_levels(device, name, shape, levels.len() as u32, usage)?;
         let sampler = vk::SamplerCreateInfo::default()
             .mag_filter(vk::Filter::LINEAR)
             .min_filter(vk::Filter::LINEAR)
@@ -91,85 +60,60 @@ impl Texture {
             .address_mode_u(wrap[0])
             .address_mode_v(wrap[1])
             .max_lod(vk::LOD_CLAMP_NONE);
-        // SAFETY: destroyed by `TextureHandle`.
-        handle.sampler = unsafe { device.handle.create_sampler(&sampler, None) }.checked("vkCreateSampler", name)?;
-        let texture = Texture { handle, _memory: memory, size_bytes: needs.size };
-        texture.fill(name, levels)?;
+        // SAFETY: destroyed by `Sampler`.
+        let sampler = unsafe { device.handle.create_sampler(&sampler, None) }.checked("vkCreateSampler", name)?;
+        let sampler = Sampler(device.clone(), sampler);
+        let texture = Texture { sampler, size_bytes: image.memory_bytes(), image };
+        texture.fill(device, name, levels)?;
         Ok(texture)
     }
 
-    fn fill(&self, name: &str, levels: &[Level<'_>]) -> Result<()> {
-        let device = &self.handle.device;
+    fn fill(&self, device: &Arc<Device>, name: &str, levels: &[Level<'_>]) -> Result<()> {
         let bytes: Vec<u8> = levels.iter().flat_map(|level| level.bytes).copied().collect();
         let mut staging = Buffer::new(device, name, BufferKind::Upload, bytes.len() as u64)?;
         staging.write(0, &bytes);
         let mut commands = Commands::new(device, name)?;
-        commands.fill_texture(&staging, self, levels);
+        commands.fill_texture(&staging, &self.image, levels);
         commands.submit().map(|_| ())
     }
 
     /// What a descriptor holds.
     pub(super) fn descriptor(&self) -> vk::DescriptorImageInfo {
         vk::DescriptorImageInfo {
-            sampler: self.handle.sampler,
-            image_view: self.handle.view,
+            sampler: self.sampler.1,
+            image_view: self.image.view(),
             image_layout: Access::GraphicsSampled.layout(),
         }
     }
 }
 
-fn all(levels: usize) -> vk::ImageSubresourceRange {
-    vk::ImageSubresourceRange {
-        aspect_mask: vk::ImageAspectFlags::COLOR,
-        base_mip_level: 0,
-        level_count: levels as u32,
-        base_array_layer: 0,
-        layer_count: 1,
-    }
-}
-
 impl<'r> Commands<'r> {
-    /// Copies the levels, which stand one after the other in `from`, and leaves the texture ready to be sampled.
-    fn fill_texture(&mut self, from: &'r Buffer, to: &'r Texture, levels: &[Level<'_>]) {
+    /// Copies the levels, which stand one after the other in `from`, and leaves the image ready to be sampled.
+    fn fill_texture(&mut self, from: &'r Buffer, to: &'r Image, levels: &[Level<'_>]) {
         let pass = self.pass_name();
         self.tracker.use_range(from.id, &from.name, from.all(), Access::TransferRead, &pass);
         let mut offset = 0;
         let mut regions = Vec::with_capacity(levels.len());
         for (number, level) in levels.iter().enumerate() {
-            let layers = vk::ImageSubresourceLayers {
-                aspect_mask: vk::ImageAspectFlags::COLOR,
-                mip_level: number as u32,
-                base_array_layer: 0,
-                layer_count: 1,
-            };
             let extent = vk::Extent3D { width: level.width, height: level.height, depth: 1 };
-            let region = vk::BufferImageCopy::default().buffer_offset(offset).image_subresource(layers);
-            regions.push(region.image_extent(extent));
+            let mut region = packed(to).buffer_offset(offset).image_extent(extent);
+            region.image_subresource.mip_level = number as u32;
+            regions.push(region);
             offset += level.bytes.len() as u64;
         }
-        let image = to.handle.image;
-        let moved = |from: Option<Access>, to: Access| {
-            vk::ImageMemoryBarrier2::default()
-                .image(image)
-                .subresource_range(all(levels.len()))
-                .old_layout(from.map_or(vk::ImageLayout::UNDEFINED, Access::layout))
-                .new_layout(to.layout())
-                .src_stage_mask(from.unwrap_or(to).stage())
-                .src_access_mask(from.map_or(vk::AccessFlags2::NONE, Access::mask))
-                .dst_stage_mask(to.stage())
-                .dst_access_mask(to.mask())
-        };
-        let before = [moved(None, Access::TransferWrite)];
-        let after = [moved(Some(Access::TransferWrite), Access::GraphicsSampled)];
-        let handle = &self.recording.device.handle;
-        let buffer = self.recording.buffer;
+        self.image_barrier(to, None, Access::TransferWrite);
+        self.tracker.use_image(to.id, &to.name, Access::TransferWrite, &pass);
         // SAFETY: the command buffer is recording and outside a render pass; both are borrowed until it has run, and the
         // regions lie within the staging buffer, which was made for them.
         unsafe {
-            handle.cmd_pipeline_barrier2(buffer, &vk::DependencyInfo::default().image_memory_barriers(&before));
-            let layout = Access::TransferWrite.layout();
-            handle.cmd_copy_buffer_to_image(buffer, from.raw(), image, layout, &regions);
-            handle.cmd_pipeline_barrier2(buffer, &vk::DependencyInfo::default().image_memory_barriers(&after));
+            self.recording.device.handle.cmd_copy_buffer_to_image(
+                self.recording.buffer,
+                from.raw(),
+                to.raw(),
+                Access::TransferWrite.layout(),
+                &regions,
+            );
         }
+        self.image_barrier(to, Some(Access::TransferWrite), Access::GraphicsSampled);
     }
 }

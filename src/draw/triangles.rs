@@ -176,44 +176,27 @@ impl Look<'_> {
 const GLOSS_BINDINGS: [u32; 2] = [2, 13];
 
 /// How the triangles of a surface become pixels.
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, PartialEq, Eq)]
 enum Form {
-    /// Both sides of triangles, or the fronts alone.
-    Vertices {
-        culls: bool,
-    },
+    /// By the light of vertices.
+    Vertices,
     /// The same over what lies behind: first the depth of what is nearest, then its colour.
-    OverDepth {
-        culls: bool,
-    },
-    Over {
-        culls: bool,
-    },
+    OverDepth,
+    Over,
     /// Pixels evaluate sharp lights.
-    Pixels {
-        culls: bool,
-    },
+    Pixels,
 }
 
 impl Form {
-    const COUNT: usize = 8;
-
-    fn number(self) -> usize {
-        match self {
-            Form::Vertices { culls } => usize::from(culls),
-            Form::OverDepth { culls } => 2 + usize::from(culls),
-            Form::Over { culls } => 4 + usize::from(culls),
-            Form::Pixels { culls } => 6 + usize::from(culls),
-        }
-    }
+    const ALL: [Form; 4] = [Form::Vertices, Form::OverDepth, Form::Over, Form::Pixels];
 }
 
 pub struct DrawTriangles {
     maker: PipelineMaker,
     /// How the sharp lights are evaluated that glossy surfaces have highlights of.
     highlights: Option<SharpPermutation>,
-    /// By look and form; each is made where it is first drawn with.
-    made: [[OnceLock<GraphicsPipeline>; Form::COUNT]; Look::COUNT],
+    /// By look, form, and whether backs of triangles are culled; each is made where it is first drawn with.
+    made: [[[OnceLock<GraphicsPipeline>; 2]; Form::ALL.len()]; Look::COUNT],
 }
 
 impl DrawTriangles {
@@ -226,36 +209,32 @@ impl DrawTriangles {
         let glossy =
             [Detail::Rough, Detail::Mirror, Detail::Textured].map(|detail| Look::Glossy { highlights, detail });
         for look in [Look::Plain, Look::Painted].into_iter().chain(glossy) {
-            let forms = [false, true].into_iter().flat_map(|culls| {
-                [Form::Vertices { culls }, Form::OverDepth { culls }, Form::Over { culls }, Form::Pixels { culls }]
-            });
-            for form in forms.filter(|form| other.made[look.number()][form.number()].get().is_some()) {
-                self.pipeline(look, form)?;
+            for (form, culls) in Form::ALL.into_iter().flat_map(|form| [(form, false), (form, true)]) {
+                if other.made[look.number()][form as usize][usize::from(culls)].get().is_some() {
+                    self.pipeline(look, form, culls)?;
+                }
             }
         }
         Ok(())
     }
 
-    fn pipeline(&self, look: Look<'_>, form: Form) -> Result<&GraphicsPipeline> {
+    fn pipeline(&self, look: Look<'_>, form: Form, culls: bool) -> Result<&GraphicsPipeline> {
         let PipelineMaker { state, display, sharp, .. } = &self.maker;
-        made_once(&self.made[look.number()][form.number()], || match form {
-            Form::Vertices { culls } | Form::OverDepth { culls } | Form::Over { culls } => {
-                let cull = if culls { vk::CullModeFlags::BACK } else { vk::CullModeFlags::NONE };
-                let keeps = match form {
-                    Form::OverDepth { .. } => Keeps::Depth,
-                    Form::Over { .. } => Keeps::ColorOver,
-                    _ => state.keeps,
-                };
-                let is_over = keeps != state.keeps;
-                let rows = Self::rows(*display, state.samples, look, is_over);
-                self.maker.make("draw", &rows, GraphicsState { cull, keeps, ..*state })
-            }
-            Form::Pixels { culls } => {
-                let sharp = sharp.as_ref().expect("pixels evaluate lights where a scene has sharp ones");
-                let cull = if culls { vk::CullModeFlags::BACK } else { vk::CullModeFlags::NONE };
-                let nearer = GraphicsState { cull, nearer_steps: NEARER_STEPS, ..*state };
-                self.maker.make("draw triangle pixels", &Self::patch_rows(*display, state.samples, look, sharp), nearer)
-            }
+        let cull = if culls { vk::CullModeFlags::BACK } else { vk::CullModeFlags::NONE };
+        made_once(&self.made[look.number()][form as usize][usize::from(culls)], || {
+            let keeps = match form {
+                Form::Vertices => state.keeps,
+                Form::OverDepth => Keeps::Depth,
+                Form::Over => Keeps::ColorOver,
+                Form::Pixels => {
+                    let sharp = sharp.as_ref().expect("pixels evaluate lights where a scene has sharp ones");
+                    let rows = Self::patch_rows(*display, state.samples, look, sharp);
+                    let nearer = GraphicsState { cull, nearer_steps: NEARER_STEPS, ..*state };
+                    return self.maker.make("draw triangle pixels", &rows, nearer);
+                }
+            };
+            let rows = Self::rows(*display, state.samples, look, form != Form::Vertices);
+            self.maker.make("draw", &rows, GraphicsState { cull, keeps, ..*state })
         })
     }
 
@@ -322,13 +301,12 @@ impl DrawTriangles {
             vec![(&mesh.positions, 0), (&mesh.emission, 0), (viewport.radiosity, entity.radiosity_offset)];
         let (look, paint, gloss) = self.look(entity, viewport);
         vertices.extend(mesh.paint.iter().filter(|_| paint.is_some()).map(|paint| (paint, 0)));
-        let culls = entity.culls;
         let form = match entity.transparent {
-            true if depth => Form::OverDepth { culls },
-            true => Form::Over { culls },
-            false => Form::Vertices { culls },
+            true if depth => Form::OverDepth,
+            true => Form::Over,
+            false => Form::Vertices,
         };
-        let pipeline = self.pipeline(look, form)?;
+        let pipeline = self.pipeline(look, form, entity.culls)?;
         drawing.bind(pipeline, &vertices, &mesh.indices);
         let push = EntityPush::new(entity, white);
         match paint {
@@ -368,7 +346,7 @@ impl DrawTriangles {
     ) -> Result<()> {
         let Some(by_pixel) = entity.by_pixel.filter(|_| self.maker.sharp.is_some()) else { return Ok(()) };
         let (look, paint, gloss) = self.look(entity, viewport);
-        let pipeline = self.pipeline(look, Form::Pixels { culls: entity.culls })?;
+        let pipeline = self.pipeline(look, Form::Pixels, entity.culls)?;
         drawing.bind(pipeline, &[], &mesh.indices);
         let mut binds = light.binds(
             &[(&mesh.indices, vk::Format::R32_UINT), (viewport.radiosity, vk::Format::R32G32B32A32_SFLOAT)],

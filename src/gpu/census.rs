@@ -44,14 +44,6 @@ impl Census {
     }
 }
 
-/// SPIR-V as text, one instruction per line.
-pub fn disassemble(shader: &Shader) -> Result<String> {
-    use rspirv::binary::Disassemble;
-    let module = rspirv::dr::load_words(&shader.spirv)
-        .map_err(|error| Error::Failed(format!("{}: unreadable SPIR-V: {error}", shader.name)))?;
-    Ok(module.disassemble())
-}
-
 fn label(block: &Block) -> u32 {
     block.label.as_ref().and_then(|l| l.result_id).unwrap_or(0)
 }

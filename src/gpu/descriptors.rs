@@ -6,8 +6,8 @@ use super::access::Access;
 use super::bind::Bind;
 use super::commands::Commands;
 use super::memory::Buffer;
-use super::pipeline::{Layout, descriptor_type};
-use super::reflect::{Binding, BindingKind};
+use super::pipeline::Layout;
+use super::reflect::Binding;
 use crate::error::{Error, Result};
 use ash::vk;
 use bytemuck::Pod;
@@ -53,6 +53,7 @@ impl<'r> Commands<'r> {
         point: vk::PipelineBindPoint,
         resources: &[Bind<'r>],
     ) -> Result<()> {
+        use vk::DescriptorType as Kind;
         if layout.bindings.is_empty() {
             return Ok(());
         }
@@ -65,30 +66,30 @@ impl<'r> Commands<'r> {
             let mut write = vk::WriteDescriptorSet::default()
                 .dst_set(set)
                 .dst_binding(binding.index)
-                .descriptor_type(descriptor_type(binding.kind))
+                .descriptor_type(binding.kind)
                 .descriptor_count(1);
             let mut buffers = [Default::default()];
             let mut views = [Default::default()];
             let mut images = [Default::default()];
             match (binding.kind, resource) {
-                (BindingKind::Storage | BindingKind::Uniform, Bind::Buffer(_) | Bind::Range(..)) => {
+                (Kind::STORAGE_BUFFER | Kind::UNIFORM_BUFFER, Bind::Buffer(_) | Bind::Range(..)) => {
                     let (buffer, range) = self.buffer_range(binding, resource, name)?;
                     let size = range.end - range.start;
                     let access = match (binding.kind, binding.writes) {
-                        (BindingKind::Storage, true) => Access::ComputeWrite,
+                        (Kind::STORAGE_BUFFER, true) => Access::ComputeWrite,
                         _ => Access::ComputeRead,
                     };
                     self.tracker.use_range(buffer.id, &buffer.name, range.clone(), access, &pass);
                     buffers = [vk::DescriptorBufferInfo { buffer: buffer.raw(), offset: range.start, range: size }];
                     write = write.buffer_info(&buffers);
                 }
-                (BindingKind::Texel, Bind::Texel(view)) => {
+                (Kind::UNIFORM_TEXEL_BUFFER, Bind::Texel(view)) => {
                     let buffer = view.buffer;
                     self.tracker.use_range(buffer.id, &buffer.name, buffer.all(), sampled, &pass);
                     views = [view.handle];
                     write = write.texel_buffer_view(&views);
                 }
-                (BindingKind::Image, Bind::Image(image)) => {
+                (Kind::SAMPLED_IMAGE, Bind::Image(image)) => {
                     self.tracker.use_image(image.id, &image.name, sampled, &pass);
                     images = [vk::DescriptorImageInfo {
                         sampler: vk::Sampler::null(),
@@ -98,7 +99,7 @@ impl<'r> Commands<'r> {
                     write = write.image_info(&images);
                 }
                 // It was filled before, and nothing writes it again.
-                (BindingKind::Sampled, Bind::Texture(texture)) => {
+                (Kind::COMBINED_IMAGE_SAMPLER, Bind::Texture(texture)) => {
                     images = [texture.descriptor()];
                     write = write.image_info(&images);
                 }
@@ -135,7 +136,7 @@ impl<'r> Commands<'r> {
         };
         let size = range.end - range.start;
         let limits = &self.recording.device.limits;
-        let (most, alignment) = if binding.kind == BindingKind::Storage {
+        let (most, alignment) = if binding.kind == vk::DescriptorType::STORAGE_BUFFER {
             (limits.max_storage_buffer_range, limits.min_storage_buffer_offset_alignment)
         } else {
             (limits.max_uniform_buffer_range, limits.min_uniform_buffer_offset_alignment)

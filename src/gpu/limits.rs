@@ -1,6 +1,6 @@
 //! Shaders' demands, compared with the device's limits before pipelines are made.
 
-use super::reflect::{Binding, BindingKind, Reflection};
+use super::reflect::{Binding, Reflection};
 use super::shader::{Shader, Stage};
 use crate::error::{Error, Result};
 use ash::vk;
@@ -12,14 +12,15 @@ pub(super) fn check(
     shaders: &[&Shader],
     bindings: &[Binding],
 ) -> Result<()> {
+    use vk::DescriptorType as Kind;
     let push_bytes = shaders.iter().map(|s| s.reflection.push_bytes).max().unwrap_or(0);
     at_most(name, "bytes of push constants", push_bytes, limits.max_push_constants_size)?;
-    let count = |kinds: &[BindingKind]| bindings.iter().filter(|b| kinds.contains(&b.kind)).count() as u32;
+    let count = |kinds: &[Kind]| bindings.iter().filter(|b| kinds.contains(&b.kind)).count() as u32;
     // A texel buffer counts as a sampled image.
-    let sampled = [BindingKind::Texel, BindingKind::Image, BindingKind::Sampled];
+    let sampled = [Kind::UNIFORM_TEXEL_BUFFER, Kind::SAMPLED_IMAGE, Kind::COMBINED_IMAGE_SAMPLER];
     for (what, asked, most) in [
-        ("storage buffers a stage", count(&[BindingKind::Storage]), limits.max_per_stage_descriptor_storage_buffers),
-        ("uniform buffers a stage", count(&[BindingKind::Uniform]), limits.max_per_stage_descriptor_uniform_buffers),
+        ("storage buffers a stage", count(&[Kind::STORAGE_BUFFER]), limits.max_per_stage_descriptor_storage_buffers),
+        ("uniform buffers a stage", count(&[Kind::UNIFORM_BUFFER]), limits.max_per_stage_descriptor_uniform_buffers),
         ("sampled images a stage", count(&sampled), limits.max_per_stage_descriptor_sampled_images),
         ("resources a stage", bindings.len() as u32, limits.max_per_stage_resources),
     ] {

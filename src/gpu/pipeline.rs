@@ -2,7 +2,7 @@
 
 use super::compiling::Compiling;
 use super::device::Device;
-use super::reflect::{Binding, BindingKind, VertexInput};
+use super::reflect::{Binding, VertexInput};
 use super::shader::{Shader, Stage};
 use super::{Checked, limits};
 use crate::error::Result;
@@ -35,7 +35,7 @@ impl Layout {
             .map(|b| {
                 vk::DescriptorSetLayoutBinding::default()
                     .binding(b.index)
-                    .descriptor_type(descriptor_type(b.kind))
+                    .descriptor_type(b.kind)
                     .descriptor_count(1)
                     .stage_flags(all_stages)
             })
@@ -86,16 +86,6 @@ fn stage_flag(stage: Stage) -> vk::ShaderStageFlags {
         Stage::Compute => vk::ShaderStageFlags::COMPUTE,
         Stage::Vertex => vk::ShaderStageFlags::VERTEX,
         Stage::Fragment => vk::ShaderStageFlags::FRAGMENT,
-    }
-}
-
-pub(super) fn descriptor_type(kind: BindingKind) -> vk::DescriptorType {
-    match kind {
-        BindingKind::Storage => vk::DescriptorType::STORAGE_BUFFER,
-        BindingKind::Uniform => vk::DescriptorType::UNIFORM_BUFFER,
-        BindingKind::Texel => vk::DescriptorType::UNIFORM_TEXEL_BUFFER,
-        BindingKind::Image => vk::DescriptorType::SAMPLED_IMAGE,
-        BindingKind::Sampled => vk::DescriptorType::COMBINED_IMAGE_SAMPLER,
     }
 }
 

@@ -2,25 +2,11 @@
 //! layout of every struct.
 
 use crate::error::{Error, Result};
+use ash::vk;
 use rspirv::binary::{Consumer, ParseAction, ParseState, parse_words};
 use rspirv::dr::{Instruction, Loader, Module, ModuleHeader, Operand};
 use rspirv::spirv::{BuiltIn, Decoration, Dim, ExecutionMode, Op, StorageClass};
 use std::collections::{BTreeMap, HashMap};
-
-/// The kind of descriptor that a binding needs.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum BindingKind {
-    /// `buffer` block.
-    Storage,
-    /// `uniform` block.
-    Uniform,
-    /// `textureBuffer` and its integer forms.
-    Texel,
-    /// `texture2D` without a sampler.
-    Image,
-    /// `sampler2D`.
-    Sampled,
-}
 
 /// One binding of descriptor set 0.
 #[derive(Clone, Debug)]
@@ -29,8 +15,8 @@ pub struct Binding {
     pub index: u32,
     /// Name of the variable, or of its block where the variable has none.
     pub name: String,
-    /// Kind of descriptor.
-    pub kind: BindingKind,
+    /// Storage or uniform block, texel buffer, image (`texture2D`), or image with a sampler (`sampler2D`).
+    pub kind: vk::DescriptorType,
     /// Whether the shader may write it.
     pub writes: bool,
     /// Bytes of the fixed part of the block; 0 for texels and images.
@@ -255,15 +241,17 @@ impl<'m> Reader<'m> {
                 let read_only = self.decoration(variable, Decoration::NonWritable).is_some()
                     || (0..members)
                         .all(|member| self.member_decoration(target, member, Decoration::NonWritable).is_some());
-                (BindingKind::Storage, !read_only)
+                (vk::DescriptorType::STORAGE_BUFFER, !read_only)
             }
-            (StorageClass::Uniform, Op::TypeStruct) => (BindingKind::Uniform, false),
+            (StorageClass::Uniform, Op::TypeStruct) => (vk::DescriptorType::UNIFORM_BUFFER, false),
             (StorageClass::UniformConstant, Op::TypeImage) => match definition.operands[1] {
-                Operand::Dim(Dim::DimBuffer) => (BindingKind::Texel, false),
-                Operand::Dim(Dim::Dim2D) => (BindingKind::Image, false),
+                Operand::Dim(Dim::DimBuffer) => (vk::DescriptorType::UNIFORM_TEXEL_BUFFER, false),
+                Operand::Dim(Dim::Dim2D) => (vk::DescriptorType::SAMPLED_IMAGE, false),
                 ref other => return Err(Error::Failed(format!("{name}: images of {other:?} are not in use"))),
             },
-            (StorageClass::UniformConstant, Op::TypeSampledImage) => (BindingKind::Sampled, false),
+            (StorageClass::UniformConstant, Op::TypeSampledImage) => {
+                (vk::DescriptorType::COMBINED_IMAGE_SAMPLER, false)
+            }
             (class, opcode) => return Err(Error::Failed(format!("{name}: no binding for {class:?} of {opcode:?}"))),
         };
         let block_bytes = if definition.class.opcode == Op::TypeStruct { self.size_bytes(target) } else { 0 };

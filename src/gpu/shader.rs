@@ -78,7 +78,7 @@ impl Shader {
         let spirv = compile(source, &includes)?;
         drop(compiling);
         if let Some(path) = path
-            && let Err(error) = crate::files::replace(&path, &seal(&key, &spirv))
+            && let Err(error) = crate::files::replace(&path, &sealed(&key, bytemuck::cast_slice(&spirv)))
         {
             log::warn!("{}: the compiled shader was not saved: {error}", path.display());
         }
@@ -171,25 +171,29 @@ fn compile(source: &ShaderSource<'_>, includes: &BTreeMap<String, String>) -> Re
     Ok(artifact.as_binary().to_vec())
 }
 
-/// Content of a cache file: a hash of the key and the words, then the words. Neither a damaged file nor one that was
-/// copied over another reaches a driver.
-fn seal(key: &str, spirv: &[u32]) -> Vec<u8> {
-    let bytes: &[u8] = bytemuck::cast_slice(spirv);
-    let mut out = hash(key, bytes).as_bytes().to_vec();
-    out.extend_from_slice(bytes);
-    out
-}
-
 /// The words of a cache file; `None` if it was not sealed with this key.
-pub fn words(key: &str, sealed: &[u8]) -> Option<Vec<u32>> {
-    let (sealed_hash, bytes) = sealed.split_at_checked(32)?;
-    (hash(key, bytes).as_bytes() == sealed_hash && bytes.len() % 4 == 0)
-        .then(|| bytes.chunks_exact(4).map(|b| u32::from_le_bytes(b.try_into().expect("four bytes"))).collect())
+pub fn words(key: &str, file: &[u8]) -> Option<Vec<u32>> {
+    let bytes = unsealed(key, file).filter(|bytes| bytes.len() % 4 == 0)?;
+    Some(bytes.chunks_exact(4).map(|b| u32::from_le_bytes(b.try_into().expect("four bytes"))).collect())
 }
 
-/// All keys have the same length, so that no other key and words give the same hash.
-fn hash(key: &str, bytes: &[u8]) -> blake3::Hash {
-    blake3::Hasher::new().update(key.as_bytes()).update(bytes).finalize()
+/// Content of a cache file: a hash of the key and the data, then the data. Neither a damaged file nor one that was
+/// copied over another reaches a driver. All keys of a kind of file have the same length, so that no other key and data
+/// give the same hash.
+pub fn sealed(key: &str, data: &[u8]) -> Vec<u8> {
+    let mut file = hash(key, data).as_bytes().to_vec();
+    file.extend_from_slice(data);
+    file
+}
+
+/// The data of a cache file; `None` if it was not sealed with this key.
+pub(super) fn unsealed<'f>(key: &str, file: &'f [u8]) -> Option<&'f [u8]> {
+    let (seal, data) = file.split_at_checked(blake3::OUT_LEN)?;
+    (hash(key, data).as_bytes() == seal).then_some(data)
+}
+
+fn hash(key: &str, data: &[u8]) -> blake3::Hash {
+    blake3::Hasher::new().update(key.as_bytes()).update(data).finalize()
 }
 
 #[cfg(test)]

@@ -254,7 +254,7 @@ fn properties() -> ash::vk::PhysicalDeviceProperties {
 fn caches() -> Vec<Vec<u8>> {
     let mut data = [32_u32, 1, 7, 9].map(u32::to_le_bytes).concat();
     data.extend([0; 40]);
-    vec![pipeline_cache::sealed(&data)]
+    vec![shader::sealed("", &data)]
 }
 
 fn pipelines(bytes: &[u8]) -> Result<()> {

@@ -223,7 +223,6 @@ impl App<'_> {
             cache: self.context.cache.clone(),
             frame: frame::Options { size: own, antialias, ..self.arguments.options.frame(&scene)? },
             format: target.format(),
-            encodes_srgb: target.encodes_srgb(),
             seed: self.global.seed,
             strict: self.arguments.gltf.gltf.strict,
             preview_after: Duration::from_secs(1),

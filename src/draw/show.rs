@@ -4,6 +4,7 @@
 
 use crate::asset::picture::srgb_from_linear;
 use crate::error::Result;
+use crate::gpu::image::encodes_srgb;
 use crate::gpu::{Bind, Device, Drawing, GraphicsPipeline, GraphicsState, Image};
 use crate::shaders::{Library, ShaderPermutation};
 use ash::vk;
@@ -23,12 +24,12 @@ pub struct Show {
 }
 
 impl Show {
-    /// For targets of `format`; `encodes_srgb` as the format is.
-    pub fn new(device: &Arc<Device>, library: &Library, format: vk::Format, encodes_srgb: bool) -> Result<Self> {
+    /// For targets of `format`.
+    pub fn new(device: &Arc<Device>, library: &Library, format: vk::Format) -> Result<Self> {
         let vertex = library.shader(&ShaderPermutation::new("show.vert", 4))?;
         let fragment = library.shader(&ShaderPermutation::new("show.frag", 4))?;
         let pipeline = GraphicsPipeline::new(device, "show", &vertex, &fragment, GraphicsState::plain(format))?;
-        Ok(Show { pipeline, encode: !encodes_srgb })
+        Ok(Show { pipeline, encode: !encodes_srgb(format) })
     }
 
     /// Covers the target with the picture; `white` is the radiance that becomes white.

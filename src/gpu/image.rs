@@ -158,6 +158,11 @@ impl Image {
     }
 }
 
+/// Whether the device encodes linear colours as sRGB when they are drawn into images of that format.
+pub fn encodes_srgb(format: vk::Format) -> bool {
+    matches!(format, vk::Format::B8G8R8A8_SRGB | vk::Format::R8G8B8A8_SRGB)
+}
+
 fn whole(format: vk::Format, levels: u32) -> vk::ImageSubresourceRange {
     let aspect =
         if format == vk::Format::D32_SFLOAT { vk::ImageAspectFlags::DEPTH } else { vk::ImageAspectFlags::COLOR };

@@ -1,5 +1,6 @@
 //! Parameters of a swapchain: present mode, size and format.
 
+use super::image::encodes_srgb;
 use crate::error::{Error, Result};
 use ash::vk;
 use clap::ValueEnum;
@@ -47,16 +48,12 @@ pub(super) fn extent(can: &vk::SurfaceCapabilitiesKHR, size: [u32; 2]) -> Option
     Some([width.clamp(least.width, most.width), height.clamp(least.height, most.height)])
 }
 
-pub(super) fn is_srgb(format: vk::Format) -> bool {
-    matches!(format, vk::Format::B8G8R8A8_SRGB | vk::Format::R8G8B8A8_SRGB)
-}
-
 /// An sRGB format if there is one, because the device then encodes and blends linearly; else an 8-bit format that the
 /// shader encodes for.
 pub(super) fn best_format(formats: &[vk::SurfaceFormatKHR]) -> Result<vk::SurfaceFormatKHR> {
     let plain = |f: &vk::SurfaceFormatKHR| matches!(f.format, vk::Format::B8G8R8A8_UNORM | vk::Format::R8G8B8A8_UNORM);
     let shown = || formats.iter().filter(|f| f.color_space == vk::ColorSpaceKHR::SRGB_NONLINEAR);
-    let found = shown().find(|f| is_srgb(f.format)).or_else(|| shown().find(|f| plain(f)));
+    let found = shown().find(|f| encodes_srgb(f.format)).or_else(|| shown().find(|f| plain(f)));
     found.copied().ok_or_else(|| Error::Unsupported("this display has no 8-bit sRGB colours".into()))
 }
 

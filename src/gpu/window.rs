@@ -3,7 +3,7 @@
 use super::device::{Device, DeviceOptions};
 use super::flight::{FLIGHTS, Flight, Signals};
 use super::image::{Image, ImageShape};
-use super::present::{PresentMode, best_format, extent, is_srgb};
+use super::present::{PresentMode, best_format, extent};
 use super::{Checked, Commands};
 use crate::error::{Error, Result};
 use ash::{khr, vk};
@@ -198,11 +198,6 @@ impl Window {
     /// Format of the images. If it is not an sRGB format, shaders must encode colours.
     pub fn format(&self) -> vk::Format {
         self.format.format
-    }
-
-    /// Whether the device encodes drawn linear colours as sRGB.
-    pub fn encodes_srgb(&self) -> bool {
-        is_srgb(self.format.format)
     }
 
     /// Notes the window's size in pixels; the next frame rebuilds the swapchain. Nothing is shown while a side is 0.

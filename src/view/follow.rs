@@ -151,8 +151,7 @@ impl Viewer {
         let library = &self.setup.library;
         let uses = |entry: &str| library.files(entry).iter().any(|file| files.contains(file));
         let show = if uses("show.vert") || uses("show.frag") {
-            Show::new(&self.setup.device, library, self.setup.format, self.setup.encodes_srgb)
-                .map(|show| self.show = show)
+            Show::new(&self.setup.device, library, self.setup.format).map(|show| self.show = show)
         } else {
             Ok(())
         };

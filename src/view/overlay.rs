@@ -4,6 +4,7 @@
 //! the target of the render pass, 8 bits a channel, sRGB by its format or by the shader.
 
 use crate::error::Result;
+use crate::gpu::image::encodes_srgb;
 use crate::gpu::{
     Access, Bind, Buffer, BufferKind, Commands, Device, Drawing, GraphicsPipeline, GraphicsState, Image, ImageShape,
     Keeps, Upload,
@@ -71,12 +72,12 @@ fn pipeline(device: &Arc<Device>, library: &Library, color: vk::Format) -> Resul
 }
 
 impl Overlay {
-    /// For targets of `format`; `encodes_srgb` as the format is.
-    pub fn new(device: &Arc<Device>, library: &Library, format: vk::Format, encodes_srgb: bool) -> Result<Self> {
+    /// For targets of `format`.
+    pub fn new(device: &Arc<Device>, library: &Library, format: vk::Format) -> Result<Self> {
         Ok(Overlay {
             device: device.clone(),
             pipeline: pipeline(device, library, format)?,
-            encode: !encodes_srgb,
+            encode: !encodes_srgb(format),
             textures: HashMap::new(),
             retired: Vec::new(),
             vertices: Upload::new(device, "overlay vertices", 1 << 18)?,

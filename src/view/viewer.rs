@@ -41,8 +41,6 @@ pub struct Setup {
     pub frame: frame::Options,
     /// Format of the frame's target.
     pub format: vk::Format,
-    /// Whether that format encodes sRGB.
-    pub encodes_srgb: bool,
     /// Seed of the reference's rays.
     pub seed: u64,
     /// Whether a glTF file of which something is left out is refused.
@@ -128,8 +126,8 @@ impl Viewer {
         panel::style(&egui);
         let mut viewer = Viewer {
             baker: Baker::new(device, &setup.library),
-            show: Show::new(device, &setup.library, setup.format, setup.encodes_srgb)?,
-            overlay: Overlay::new(device, &setup.library, setup.format, setup.encodes_srgb)?,
+            show: Show::new(device, &setup.library, setup.format)?,
+            overlay: Overlay::new(device, &setup.library, setup.format)?,
             egui,
             paint: Paint { primitives: Vec::new(), pixels_per_point: scale },
             input: Input::new(scale),

@@ -76,7 +76,7 @@ pub fn run(folder: &Path) -> Result<()> {
     let device = Device::for_display(&options, own.display_handle().unwrap().as_raw())?;
     // What is presented is seen at once, and not when the display is next refreshed.
     let mut target = Window::new(&device, &own, SIZE, PresentMode::Immediate)?;
-    let mut viewer = viewer(folder, device.clone(), options, (target.format(), target.encodes_srgb()))?;
+    let mut viewer = viewer(folder, device.clone(), options, target.format())?;
     // As the window does: again where nothing was drawn, or something new would be seen.
     show(&mut viewer, &mut |viewer| Ok(viewer.draw(FrameTarget::Window(&mut target))? && !viewer.wants_frame()))?;
     std::fs::write(folder.join("d.raw"), own.look()).map_err(|error| Error::Failed(error.to_string()))

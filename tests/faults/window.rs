@@ -21,7 +21,7 @@ pub fn run(folder: &Path) -> Result<()> {
     let device = Device::new(&options)?;
     let [width, height] = SIZE;
     let image = Image::new(&device, "window", ImageShape { format: FORMAT, width, height, samples: 1 })?;
-    let mut viewer = viewer(folder, device.clone(), options, (FORMAT, true))?;
+    let mut viewer = viewer(folder, device.clone(), options, FORMAT)?;
     show(&mut viewer, &mut |viewer| viewer.draw(FrameTarget::Image(&image)))?;
     let pixels = look(&device, &image)?;
     drop(viewer);
@@ -33,13 +33,8 @@ pub fn device_options(folder: &Path) -> DeviceOptions {
     DeviceOptions { cache_dir: Some(folder.join("cache")), ..DeviceOptions::default() }
 }
 
-/// A viewer of the folder's scene that draws into targets of that format, which encodes sRGB or does not.
-pub fn viewer(
-    folder: &Path,
-    device: Arc<Device>,
-    options: DeviceOptions,
-    (format, encodes_srgb): (ash::vk::Format, bool),
-) -> Result<Viewer> {
+/// A viewer of the folder's scene that draws into targets of that format.
+pub fn viewer(folder: &Path, device: Arc<Device>, options: DeviceOptions, format: ash::vk::Format) -> Result<Viewer> {
     let cache_dir = folder.join("cache");
     let path = folder.join("scene.toml");
     let setup = Setup {
@@ -49,7 +44,6 @@ pub fn viewer(
         cache: Cache::new(Some(&cache_dir)),
         frame: frame_options(),
         format,
-        encodes_srgb,
         seed: 1,
         strict: false,
         preview_after: Duration::from_secs(60),

@@ -47,7 +47,6 @@ impl Stand {
             cache: Cache::new(Some(&cache)),
             frame: frame::Options { size: SIZE, ..shadow_fields::check::merge::options() },
             format: FORMAT,
-            encodes_srgb: true,
             seed: 1,
             strict: false,
             preview_after: Duration::from_secs(60),

@@ -15,7 +15,6 @@ use crate::error::{Error, Result};
 use ash::vk;
 use bytemuck::Pod;
 use std::ffi::CString;
-use std::marker::PhantomData;
 use std::ops::Range;
 use std::sync::Arc;
 
@@ -39,7 +38,6 @@ pub struct Commands<'r> {
     /// Buffers that the host will read, with the ranges that were copied into them.
     read_back: Vec<(&'r Buffer, Range<u64>)>,
     barrier_count: usize,
-    borrows: PhantomData<&'r Buffer>,
 }
 
 impl<'r> Commands<'r> {
@@ -51,7 +49,6 @@ impl<'r> Commands<'r> {
             tracker: Tracker::default(),
             read_back: Vec::new(),
             barrier_count: 0,
-            borrows: PhantomData,
         })
     }
 
@@ -214,14 +211,6 @@ impl<'r> Commands<'r> {
             handle.cmd_dispatch(self.recording.buffer, groups[0], groups[1], groups[2]);
         }
         Ok(())
-    }
-
-    /// Copies the whole of `from` to the start of `to`.
-    ///
-    /// # Panics
-    /// When `to` is smaller.
-    pub fn copy(&mut self, from: &'r Buffer, to: &'r Buffer) {
-        self.copy_range(from, 0..from.size_bytes, to, 0);
     }
 
     /// Copies a byte range of `from` to a byte offset of `to`.

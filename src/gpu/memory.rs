@@ -215,21 +215,12 @@ impl Buffer {
     /// When the buffer is not visible to the host or the range is outside it.
     pub fn read<T: Pod>(&self, offset_bytes: u64, count: usize) -> Vec<T> {
         self.device().settle();
-        self.peek(offset_bytes, count)
-    }
-
-    /// As [`Buffer::read`] without waiting; the recording that writes the range must have ended.
-    ///
-    /// # Panics
-    /// As [`Buffer::read`].
-    pub fn peek<T: Pod>(&self, offset_bytes: u64, count: usize) -> Vec<T> {
         let pointer = self.mapped.unwrap_or_else(|| panic!("{} is not visible to the host", self.name));
         let end = offset_bytes + (count * size_of::<T>()) as u64;
         assert!(end <= self.size_bytes, "{}: read to byte {end} of {}", self.name, self.size_bytes);
         let mut out = vec![T::zeroed(); count];
         let bytes: &mut [u8] = bytemuck::cast_slice_mut(&mut out);
-        // SAFETY: in bounds of the mapping (asserted); every submission that writes it has finished, as the caller sees
-        // to.
+        // SAFETY: in bounds of the mapping (asserted); every submission that writes it has finished.
         unsafe { std::ptr::copy_nonoverlapping(pointer.add(offset_bytes as usize), bytes.as_mut_ptr(), bytes.len()) };
         out
     }

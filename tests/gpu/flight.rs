@@ -25,9 +25,9 @@ fn at_most_two_are_under_way_and_owners_wait_for_them() {
         commands.after_flights();
         commands
             .pass("copy", |c| {
-                c.copy(&source, &passing);
+                c.copy_range(&source, 0..source.size_bytes, &passing, 0);
                 c.barrier(Access::TransferWrite, Access::TransferRead);
-                c.copy(&passing, &kept);
+                c.copy_range(&passing, 0..passing.size_bytes, &kept, 0);
                 Ok(())
             })
             .unwrap();
@@ -49,8 +49,8 @@ fn a_flight_is_checked_by_the_tracker_like_any_recording() {
     let a = Buffer::new(&gpu.device, "a", BufferKind::Device, 64).unwrap();
     let b = Buffer::new(&gpu.device, "b", BufferKind::Device, 64).unwrap();
     let mut commands = Commands::new(&gpu.device, "flight").unwrap();
-    commands.copy(&a, &b);
-    commands.copy(&b, &a);
+    commands.copy_range(&a, 0..a.size_bytes, &b, 0);
+    commands.copy_range(&b, 0..b.size_bytes, &a, 0);
     let error = commands.launch().err().expect("no barrier stands between the copies").to_string();
     assert!(error.contains("no barrier"), "{error}");
     assert!(!gpu.device.take_validation_messages().is_empty(), "the layer hears two copies too");

@@ -48,8 +48,8 @@ fn the_layer_hears_a_hazard_between_copies() {
     let Some(gpu) = gpu() else { return };
     let [a, b, c] = ["a", "b", "c"].map(|name| buffer(&gpu, name, BufferKind::Device));
     let mut commands = Commands::new(&gpu.device, "canary").unwrap();
-    commands.copy(&a, &b);
-    commands.copy(&b, &c);
+    commands.copy_range(&a, 0..a.size_bytes, &b, 0);
+    commands.copy_range(&b, 0..b.size_bytes, &c, 0);
     assert!(commands.submit().is_err());
     let heard = gpu.device.take_validation_messages();
     assert!(heard.iter().any(|m| m.contains("SYNC-HAZARD-READ")), "synchronisation checks are off: {heard:?}");
@@ -96,7 +96,7 @@ fn chain(gpu: &Gpu) -> Result<Vec<f32>> {
     commands.pass("second", |c| pass.record(c, [&middle, &offsets, &list], (&output, 0..256), (16, 1), 3.0))?;
     commands.barrier(Access::ComputeWrite, Access::TransferRead);
     commands.pass("third", |c| {
-        c.copy(&output, &host);
+        c.copy_range(&output, 0..output.size_bytes, &host, 0);
         Ok(())
     })?;
     commands.barrier(Access::TransferWrite, Access::HostRead);
@@ -146,9 +146,9 @@ fn a_wrong_kind_of_barrier_is_no_barrier() {
         (Access::TransferRead, Access::TransferWrite, false),
     ] {
         let mut commands = Commands::new(&gpu.device, "copies").unwrap();
-        commands.copy(&a, &b);
+        commands.copy_range(&a, 0..a.size_bytes, &b, 0);
         commands.barrier(from, to);
-        commands.copy(&b, &c);
+        commands.copy_range(&b, 0..b.size_bytes, &c, 0);
         let outcome = commands.submit();
         assert_eq!(outcome.is_ok(), good, "{from:?} to {to:?}");
         let heard = gpu.device.take_validation_messages();

@@ -8,10 +8,6 @@ use std::sync::Mutex;
 /// Name of the Khronos layer, as the loader lists it.
 pub const LAYER: &CStr = c"VK_LAYER_KHRONOS_validation";
 
-/// Message id names that are known to be harmless, each with the reason. Empty, because no tested driver needs an
-/// exception.
-const ACCEPTED: &[(&str, &str)] = &[];
-
 /// How much of the validation layer is switched on.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
@@ -46,7 +42,7 @@ impl Validation {
 pub struct Messages(Mutex<Vec<String>>);
 
 impl Messages {
-    /// Messages reported since the last call, oldest first, without the accepted ones.
+    /// Messages reported since the last call, oldest first.
     pub fn take(&self) -> Vec<String> {
         std::mem::take(&mut *self.0.lock().unwrap_or_else(|poisoned| poisoned.into_inner()))
     }
@@ -86,7 +82,7 @@ pub(super) unsafe extern "system" fn on_message(
     };
     let id = text(data.p_message_id_name);
     let body = text(data.p_message);
-    if ACCEPTED.iter().any(|(accepted, _)| *accepted == id) || id == "Loader Message" {
+    if id == "Loader Message" {
         return vk::FALSE;
     }
     if severity.contains(vk::DebugUtilsMessageSeverityFlagsEXT::ERROR) {

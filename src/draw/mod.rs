@@ -383,9 +383,7 @@ impl Draw {
         }
         Ok(())
     }
-}
 
-impl Draw {
     /// Draws transparent entities over everything else, from far to near.
     fn record_transparent<'r>(
         &'r self,

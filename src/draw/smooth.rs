@@ -15,7 +15,6 @@ use crate::error::Result;
 use crate::gpu::{Access, Bind, Commands, Device, GraphicsPipeline, GraphicsState, Image, ImageShape, Target, Upload};
 use crate::layout::TAG_STEP;
 use crate::shaders::{Library, ShaderPermutation};
-use bytemuck::{Pod, Zeroable};
 use glam::{DVec2, DVec3, IVec2};
 use std::sync::Arc;
 
@@ -120,12 +119,6 @@ impl Lines {
     }
 }
 
-#[repr(C)]
-#[derive(Clone, Copy, Pod, Zeroable)]
-struct Push {
-    area: [i32; 4],
-}
-
 /// The pipeline and its picture.
 pub struct Smooth {
     pipeline: GraphicsPipeline,
@@ -171,7 +164,7 @@ impl Smooth {
             for DrawnViewport { area, lines, .. } in viewports.iter().filter(|viewport| !viewport.lines.is_empty()) {
                 let [left, top, width, height] = *area;
                 drawing.area(left, top, width, height);
-                drawing.push(&Push { area: [left, top, left + width - 1, top + height - 1].map(u32::cast_signed) });
+                drawing.push(&[left, top, left + width - 1, top + height - 1].map(u32::cast_signed));
                 drawing.indexed(6 * lines.start..6 * lines.end);
             }
             Ok(())

@@ -5,7 +5,7 @@ use crate::draw::camera;
 use crate::draw::smooth::{self, Smooth, Texel};
 use crate::error::Result;
 use crate::scene::Placement;
-use glam::{DMat3, DVec2, DVec3, DVec4};
+use glam::{DMat3, DVec2, DVec3, DVec4, Vec3};
 use rayon::prelude::*;
 
 /// Vulkan's standard places of four samples in a pixel ("Standard sample locations"), and of one.
@@ -52,7 +52,7 @@ impl Frame {
         let [width, height] = self.options.size;
         let triangles = self.triangles(placements)?;
         let camera = &self.scene.data.camera;
-        let near_m = crate::draw::camera::near_m(camera);
+        let near_m = camera::near_m(camera);
         let shade = |pixel: u32| {
             let corner = DVec2::new(f64::from(pixel % width), f64::from(pixel / width));
             let clip =
@@ -113,20 +113,19 @@ impl Frame {
             let radiosity = self.radiosity(index)?;
             let rotation = placement.turn();
             let grid = self.buffers.surface(index).drawn.grid().map(|_| index);
-            let corner = |&i: &u32| {
+            let corner = |i: u32| {
                 let v = i as usize;
                 let world = placement.position.as_dvec3()
                     + rotation * (mesh.positions[v].as_dvec3() * f64::from(placement.scale));
-                let pattern = mesh.colors.as_ref().map_or(glam::Vec3::ONE, |colors| colors[v]);
+                let pattern = mesh.colors.as_ref().map_or(Vec3::ONE, |colors| colors[v]);
                 let emitted = (entity.emission * pattern).as_dvec3();
-                (clip_from_world * world.extend(1.0), emitted + glam::Vec3::from_array(radiosity[v]).as_dvec3())
+                (clip_from_world * world.extend(1.0), emitted + Vec3::from_array(radiosity[v]).as_dvec3())
             };
             for triangle in &mesh.triangles {
-                let [a, b, c] = [corner(&triangle[0]), corner(&triangle[1]), corner(&triangle[2])];
-                out.extend(
-                    ScreenTriangle::new([a.0, b.0, c.0], [a.1, b.1, c.1], [width, height], smooth::tag(index))
-                        .map(|corners| ScreenTriangle { grid, ..corners }),
-                );
+                let corners = triangle.map(corner);
+                let clip = corners.map(|(clip, _)| clip);
+                let radiance = corners.map(|(_, radiance)| radiance);
+                out.extend(ScreenTriangle::new(clip, radiance, [width, height], smooth::tag(index), grid));
             }
         }
         Ok(out)
@@ -141,7 +140,7 @@ fn shown(radiance: DVec3, white: f64) -> DVec3 {
 
 impl ScreenTriangle {
     /// `None` for a triangle that is seen from its edge.
-    fn new(clip: [DVec4; 3], radiance: [DVec3; 3], size: [f64; 2], tag: f32) -> Option<Self> {
+    fn new(clip: [DVec4; 3], radiance: [DVec3; 3], size: [f64; 2], tag: f32, grid: Option<usize>) -> Option<Self> {
         let matrix = DMat3::from_cols_array_2d(&clip.map(|c| [c.x, c.y, c.w]));
         let weights = matrix.inverse();
         if !weights.is_finite() || matrix.determinant() == 0.0 {
@@ -149,16 +148,14 @@ impl ScreenTriangle {
         }
         let in_front = clip.iter().all(|c| c.w > 0.0);
         let range = |axis: usize| {
-            let places = clip.map(|c| (c[axis] / c.w + 1.0) / 2.0 * size[axis]);
             // A triangle that reaches behind the eye may be anywhere.
-            let whole = [0.0, size[axis]];
-            if in_front {
-                [places.iter().copied().fold(f64::MAX, f64::min), places.iter().copied().fold(f64::MIN, f64::max)]
-            } else {
-                whole
+            if !in_front {
+                return [0.0, size[axis]];
             }
+            let places = clip.map(|c| (c[axis] / c.w + 1.0) / 2.0 * size[axis]);
+            [places.iter().copied().fold(f64::MAX, f64::min), places.iter().copied().fold(f64::MIN, f64::max)]
         };
-        Some(ScreenTriangle { weights, radiance, tag, grid: None, pixels: [range(0), range(1)] })
+        Some(ScreenTriangle { weights, radiance, tag, grid, pixels: [range(0), range(1)] })
     }
 
     /// Whether it may cover any of the pixel whose corner is given.

@@ -117,7 +117,7 @@ impl Frame {
                 factors: [factor.roughness, factor.metallic, 1.0, f32::from(u8::from(entity.maps.glow.is_some()))],
             };
         }
-        self.reflections.as_mut().map_or(Ok(()), |reflections| reflections.set_entities(&entities))
+        self.reflections.as_mut().map_or(Ok(()), |reflections| reflections.entities.write(&entities))
     }
 
     /// How the pixels of an entity reflect.

@@ -187,9 +187,7 @@ impl FrameTwin<'_> {
         };
         self.receivers.iter().map(lit).collect()
     }
-}
 
-impl FrameTwin<'_> {
     /// An object as the pass of sharp lights sees it.
     fn outline<'o>(&'o self, (index, object): (usize, &MergeObject<'o>)) -> SharpObject<'o> {
         let device_mesh = &self.frame.buffers.meshes[self.frame.scene.entities[index].mesh];
@@ -302,6 +300,6 @@ fn listed(state: &State, lists: &ClusterLists, receiver: usize, surface: &Device
 }
 
 /// Entities that satisfy a condition.
-fn indices(scene: &Scene, condition: impl Fn(&crate::scene::Entity) -> bool) -> Vec<usize> {
+fn indices(scene: &Scene, condition: impl Fn(&Entity) -> bool) -> Vec<usize> {
     (0..scene.entities.len()).filter(|&i| condition(&scene.entities[i])).collect()
 }

@@ -122,8 +122,8 @@ pub struct Reflections {
     /// Workgroups: an entity, and the first of its vertices.
     groups: Buffer,
     group_count: u32,
-    /// [`GlossEntity`] of every entity of the scene.
-    entities: Upload,
+    /// [`GlossEntity`] of every entity of the scene, as the eye sees it.
+    pub entities: Upload,
     /// For every entity the sharp lights that its highlights are of.
     pub shown_lights: Buffer,
     /// Transfer at the end of the sky's chain, sixteen halves a vertex, which the merge writes.
@@ -168,7 +168,7 @@ impl Reflections {
                 (0..of.vertex_count).step_by(CLUSTER_VERTICES as usize).map(|first| [of.entity as u32, first])
             })
             .collect();
-        let mut shown_lights = vec![NO_LIGHTS; entity_count];
+        let mut shown_lights = vec![[NONE; SHOWN_LIGHTS]; entity_count];
         glossy.iter().for_each(|of| shown_lights[of.entity] = of.lights);
         Ok(Reflections {
             pipeline: ComputePipeline::new(device, "gloss", &library.shader(&gloss_row(texels))?)?,
@@ -205,11 +205,6 @@ impl Reflections {
     /// Radiance that 1 in the sky's map stands for.
     pub fn sky_scale(&self) -> f32 {
         self.sky.scale
-    }
-
-    /// Sets the entities as the eye sees them, one for every entity of the scene.
-    pub fn set_entities(&mut self, entities: &[GlossEntity]) -> Result<()> {
-        self.entities.write(entities)
     }
 
     /// Computes what every vertex reflects.
@@ -273,9 +268,6 @@ impl<'b> DrawnReflections<'b> {
         ])
     }
 }
-
-/// No light is shown.
-const NO_LIGHTS: [u32; SHOWN_LIGHTS] = [NONE; SHOWN_LIGHTS];
 
 /// A texture of halves.
 fn texture(device: &Arc<Device>, name: &str, width: u32, texels: &[[f32; 4]]) -> Result<Texture> {

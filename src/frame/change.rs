@@ -1,9 +1,10 @@
 //! Changes between frames: the scene's lights and camera, the merge's variant, and shader files.
 
-use super::permutation::{CompiledMerge, harmonic_lights, usable};
+use super::permutation::{harmonic_lights, usable};
 use super::{Frame, albedos, methods, permutation};
 use crate::bake;
 use crate::error::Result;
+use crate::merge::Merge;
 use crate::merge::calibrate;
 use crate::merge::variant::{MergePermutation, Variant};
 use crate::scene::{Camera, Entity, Scene};
@@ -79,7 +80,7 @@ impl Frame {
     fn compile_merge(&mut self, wanted: MergePermutation) -> Result<()> {
         let usable = usable(&self.device, &self.buffers, self.scene.entities.len(), wanted);
         if usable != self.merge.permutation {
-            self.merge = CompiledMerge::new(&self.device, &self.library, usable)?;
+            self.merge = Merge::new(&self.device, &self.library, usable)?;
             self.forget();
         }
         Ok(())
@@ -118,7 +119,7 @@ impl Frame {
             self.forget();
         }
         if uses("merge.comp") {
-            self.merge = CompiledMerge::new(&self.device, &self.library, self.merge.permutation)?;
+            self.merge = Merge::new(&self.device, &self.library, self.merge.permutation)?;
             self.forget();
         }
         Ok(())

@@ -36,14 +36,14 @@ use crate::layout::{CLUSTER_FORMAT, ENTRY_FORMAT};
 use crate::lists::incremental::{ClusterLists, Merged};
 use crate::merge::calibrate;
 use crate::merge::variant::{MergePermutation, Reads, Variant, uniform_entities};
-use crate::merge::{MergeInputs, Readable};
+use crate::merge::{Merge, MergeInputs, Readable};
 use crate::scene::groups::Groups;
 use crate::scene::{LightMethod, Lights, Placement, Scene, light};
 use crate::scene_buffers::{SceneBuffers, limits};
 use crate::shaders::Library;
 use crate::sharp::{self, Sharp, SharpPermutation};
 use ash::vk;
-use permutation::{CompiledMerge, permutation, pixel_shading, usable};
+use permutation::{permutation, pixel_shading, usable};
 use picture::FramePicture;
 use pixel::PixelChains;
 use prepare::ClusterWork;
@@ -84,7 +84,7 @@ pub struct Frame {
     options: Options,
     /// Baked and uploaded data.
     pub buffers: SceneBuffers,
-    merge: CompiledMerge,
+    merge: Merge,
     /// The pass of sharp lights, if the scene has any.
     sharp: Option<Sharp>,
     work: ClusterWork,
@@ -137,7 +137,7 @@ impl Frame {
             wanted.variant.reads == Reads::Texels,
         )?;
         let wanted = MergePermutation { gloss: reflections.is_some(), ..wanted };
-        let merge = CompiledMerge::new(device, library, usable(device, &buffers, entity_count, wanted))?;
+        let merge = Merge::new(device, library, usable(device, &buffers, entity_count, wanted))?;
         let sharp = permutation::sharp(&options, &merge.permutation, &methods, &scene, &buffers);
         if sharp.is_some() {
             radiosity.keep_soft()?;
@@ -285,7 +285,7 @@ impl Frame {
         Ok(Some(MergeWork {
             cluster_count,
             inputs: self.inputs(&self.merge.permutation)?,
-            merge: &self.merge.pass,
+            merge: &self.merge,
             sharp: self.sharp.as_ref().map(|sharp| (sharp, self.sharp_inputs())),
             soft: self.radiosity.soft_direct(),
             radiosity: self.radiosity.direct(),

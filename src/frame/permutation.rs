@@ -2,31 +2,14 @@
 
 use super::Options;
 use crate::draw::Shading;
-use crate::error::Result;
 use crate::field::silhouette::SilhouetteField;
 use crate::gpu::{Buffer, Device, TexelView};
 use crate::layout::DeviceEntity;
-use crate::merge::Merge;
 use crate::merge::variant::{MergePermutation, Variant};
 use crate::scene::{LightMethod, Scene};
 use crate::scene_buffers::SceneBuffers;
-use crate::shaders::Library;
 use crate::sharp::SharpPermutation;
 use ash::vk;
-use std::sync::Arc;
-
-/// The merge pass of a frame.
-pub(super) struct CompiledMerge {
-    pub pass: Merge,
-    pub permutation: MergePermutation,
-}
-
-impl CompiledMerge {
-    /// Compiles it for what [`usable`] returned.
-    pub fn new(device: &Arc<Device>, library: &Library, permutation: MergePermutation) -> Result<Self> {
-        Ok(CompiledMerge { pass: Merge::new(device, library, permutation)?, permutation })
-    }
-}
 
 /// The permutation with its variant less the texel views or uniform blocks that cannot hold the scene.
 pub(super) fn usable(

@@ -3,7 +3,6 @@
 //! read, in buffers of that flight's own.
 
 use super::Frame;
-use super::permutation::CompiledMerge;
 use super::pixel::PixelChains;
 use super::viewport::{RadiositySource, Viewport};
 use crate::asset::edges::Edges;
@@ -13,6 +12,7 @@ use crate::gpu::{Device, TexelView, Upload};
 use crate::layout::{self, CLUSTER_FORMAT, ENTRY_FORMAT};
 use crate::lists::incremental::{ClusterLists, Dirty, Merged};
 use crate::lists::sight::Sight;
+use crate::merge::Merge;
 use crate::merge::variant::{MergePermutation, Reads};
 use crate::scene::Placement;
 use crate::scene_buffers::limits;
@@ -181,7 +181,7 @@ impl Frame {
             let variant = permutation.variant.restricted(false, false);
             log::info!("the lists are too long for texel views; using \"{}\"", variant.name);
             let permutation = MergePermutation { variant, ..permutation };
-            self.merge = CompiledMerge::new(&self.device, &self.library, permutation)?;
+            self.merge = Merge::new(&self.device, &self.library, permutation)?;
         }
         Ok(())
     }

@@ -57,11 +57,13 @@ pub struct MergeInputs<'b> {
 
 pub struct Merge {
     pipeline: ComputePipeline,
+    pub permutation: MergePermutation,
 }
 
 impl Merge {
     pub fn new(device: &Arc<Device>, library: &Library, permutation: MergePermutation) -> Result<Self> {
-        Ok(Merge { pipeline: ComputePipeline::new(device, "merge", &library.shader(&permutation.row())?)? })
+        let pipeline = ComputePipeline::new(device, "merge", &library.shader(&permutation.row())?)?;
+        Ok(Merge { pipeline, permutation })
     }
 
     /// Lights the first `cluster_count` clusters.

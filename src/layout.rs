@@ -246,6 +246,8 @@ pub const GROUP_CLUSTERS: usize = 16;
 pub const ENTRY_FORMAT: vk::Format = vk::Format::R32_UINT;
 /// Texels through which they read [`Cluster`]: two of its numbers each.
 pub const CLUSTER_FORMAT: vk::Format = vk::Format::R32G32_UINT;
+/// As which texel views show floats: a texel is four of them.
+pub const QUAD_FORMAT: vk::Format = vk::Format::R32G32B32A32_SFLOAT;
 
 /// Bits of an entity's number in an entry.
 pub const ENTRY_BITS: u32 = 14;

@@ -11,7 +11,7 @@ use crate::draw::pixel_light::{PixelLight, texels};
 use crate::draw::{DrawnEntity, DrawnViewport, EntityPush, PipelineMaker, made_once};
 use crate::error::Result;
 use crate::gpu::{Buffer, Device, Drawing, GraphicsPipeline, GraphicsState, TexelView};
-use crate::layout::UPWARDS;
+use crate::layout::{QUAD_FORMAT, UPWARDS};
 use crate::shaders::ShaderPermutation;
 use crate::sharp::SharpPermutation;
 use ash::vk;
@@ -24,7 +24,6 @@ const QUADS: vk::Format = vk::Format::R32G32B32A32_UINT;
 /// How much nearer patches are drawn than the grid that they lie on, in steps of depth: 2e-6 of the distance. Rounding
 /// of two triangles in one plane differs by less.
 const NEARER_STEPS: f32 = 32.0;
-const FLOATS: vk::Format = vk::Format::R32G32B32A32_SFLOAT;
 
 pub struct DrawnGrid {
     positions: Buffer,
@@ -80,7 +79,7 @@ impl DrawnGrid {
 
     /// Whether a device's texel views hold that many cells and that many vertices in all.
     pub fn fits(device: &Device, cells: usize, vertices: usize) -> bool {
-        TexelView::fits(device, QUADS, 16 * cells as u64) && TexelView::fits(device, FLOATS, 16 * vertices as u64)
+        TexelView::fits(device, QUADS, 16 * cells as u64) && TexelView::fits(device, QUAD_FORMAT, 16 * vertices as u64)
     }
 
     /// Device memory, bytes.
@@ -177,7 +176,7 @@ impl DrawGrid {
 
     /// Bindings of both fragment shaders.
     fn own<'r>(grid: &'r DrawnGrid, viewport: &DrawnViewport<'r>) -> [(&'r Buffer, vk::Format); 2] {
-        [(&grid.corners, QUADS), (viewport.radiosity, FLOATS)]
+        [(&grid.corners, QUADS), (viewport.radiosity, QUAD_FORMAT)]
     }
 
     fn finish(

@@ -2,9 +2,8 @@
 
 use crate::error::Result;
 use crate::gpu::{Bind, Buffer, TexelView};
+use crate::layout::QUAD_FORMAT;
 use ash::vk;
-
-const FLOATS: vk::Format = vk::Format::R32G32B32A32_SFLOAT;
 
 /// Where the pixels of an entity find what they evaluate sharp lights by.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -42,12 +41,12 @@ impl<'d> PixelLight<'d> {
     ) -> Result<Vec<Bind<'d>>> {
         let [nodes, cells] = self.silhouettes;
         let shared = [
-            (self.entities, FLOATS),
-            (nodes, FLOATS),
+            (self.entities, QUAD_FORMAT),
+            (nodes, QUAD_FORMAT),
             (cells, vk::Format::R32G32_UINT),
             (self.entries, vk::Format::R32_UINT),
             (self.chains, vk::Format::R32G32_UINT),
-            (self.soft, FLOATS),
+            (self.soft, QUAD_FORMAT),
         ];
         texels(&[&own[..], &shared, others].concat())
     }

@@ -9,6 +9,7 @@ use crate::draw::{DrawnEntity, DrawnPaint, DrawnViewport, EntityPush, PipelineMa
 use crate::error::Result;
 use crate::gloss::{self, DrawnReflections};
 use crate::gpu::{Bind, Buffer, Device, Drawing, GraphicsPipeline, GraphicsState, Keeps, TexelView};
+use crate::layout::QUAD_FORMAT;
 use crate::lists::sight::TriangleRun;
 use crate::shaders::ShaderPermutation;
 use crate::sharp::SharpPermutation;
@@ -87,7 +88,7 @@ impl DrawnTriangles {
         TexelView::fits(device, vk::Format::R32_UINT, self.indices.size_bytes)
             && TexelView::fits(device, vk::Format::R32G32_UINT, self_cells.size_bytes)
             && TexelView::fits(device, vk::Format::R32_UINT, self.emission.size_bytes)
-            && TexelView::fits(device, vk::Format::R32G32B32A32_SFLOAT, vertices.size_bytes)
+            && TexelView::fits(device, QUAD_FORMAT, vertices.size_bytes)
     }
 }
 
@@ -314,11 +315,11 @@ impl DrawTriangles {
             Some(paint) => {
                 let mut binds = vec![Bind::Texture(paint.texture)];
                 if let Some(gloss) = gloss {
-                    binds.extend(texels(&[(gloss.vertices, vk::Format::R32G32B32A32_SFLOAT)])?);
+                    binds.extend(texels(&[(gloss.vertices, QUAD_FORMAT)])?);
                     binds.extend(gloss.binds()?);
                     binds.extend(Self::maps(entity, gloss));
                     if self.highlights.is_some() {
-                        binds.extend(texels(&[(gloss.lights, vk::Format::R32G32B32A32_SFLOAT)])?);
+                        binds.extend(texels(&[(gloss.lights, QUAD_FORMAT)])?);
                     }
                 }
                 drawing.resources(&binds)?;
@@ -349,9 +350,9 @@ impl DrawTriangles {
         let pipeline = self.pipeline(look, Form::Pixels, entity.culls)?;
         drawing.bind(pipeline, &[], &mesh.indices);
         let mut binds = light.binds(
-            &[(&mesh.indices, vk::Format::R32_UINT), (viewport.radiosity, vk::Format::R32G32B32A32_SFLOAT)],
+            &[(&mesh.indices, vk::Format::R32_UINT), (viewport.radiosity, QUAD_FORMAT)],
             &[
-                (light.vertices, vk::Format::R32G32B32A32_SFLOAT),
+                (light.vertices, QUAD_FORMAT),
                 (&mesh.emission, vk::Format::R32_UINT),
                 (light.self_cells, vk::Format::R32G32_UINT),
             ],

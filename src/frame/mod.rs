@@ -32,7 +32,7 @@ use crate::draw::{PictureLights, Shading};
 use crate::error::Result;
 use crate::gloss::Reflections;
 use crate::gpu::{Buffer, Commands, Device, Timing};
-use crate::layout::{CLUSTER_FORMAT, ENTRY_FORMAT};
+use crate::layout::{CLUSTER_FORMAT, ENTRY_FORMAT, QUAD_FORMAT};
 use crate::lists::incremental::{ClusterLists, Merged};
 use crate::merge::calibrate;
 use crate::merge::variant::{MergePermutation, Reads, Variant, uniform_entities};
@@ -42,7 +42,6 @@ use crate::scene::{LightMethod, Lights, Placement, Scene, light};
 use crate::scene_buffers::{SceneBuffers, limits};
 use crate::shaders::Library;
 use crate::sharp::{self, Sharp, SharpPermutation};
-use ash::vk;
 use permutation::{permutation, pixel_shading, usable};
 use picture::FramePicture;
 use pixel::PixelChains;
@@ -318,15 +317,14 @@ impl Frame {
     }
 
     fn inputs(&self, permutation: &MergePermutation) -> Result<MergeInputs<'_>> {
-        let floats = vk::Format::R32G32B32A32_SFLOAT;
         Ok(MergeInputs {
             entities: Readable::shared(&self.work.entities, permutation.variant)?,
             entries: Readable::new(&self.work.entries, permutation.variant, ENTRY_FORMAT)?,
             clusters: Readable::new(&self.work.clusters, permutation.variant, CLUSTER_FORMAT)?,
             fields: Readable::new(&self.buffers.fields, permutation.variant, permutation.field_format())?,
-            transfers: Readable::new(&self.buffers.transfers, permutation.variant, floats)?,
-            vertices: Readable::new(&self.buffers.vertices, permutation.variant, floats)?,
-            sky: Readable::new(&self.sky.coefficients, permutation.variant, floats)?,
+            transfers: Readable::new(&self.buffers.transfers, permutation.variant, QUAD_FORMAT)?,
+            vertices: Readable::new(&self.buffers.vertices, permutation.variant, QUAD_FORMAT)?,
+            sky: Readable::new(&self.sky.coefficients, permutation.variant, QUAD_FORMAT)?,
             through: self.kept_for_gloss().map(|[through, ..]| through),
         })
     }

@@ -4,12 +4,11 @@ use super::Options;
 use crate::draw::Shading;
 use crate::field::silhouette::SilhouetteField;
 use crate::gpu::{Buffer, Device, TexelView};
-use crate::layout::DeviceEntity;
+use crate::layout::{DeviceEntity, QUAD_FORMAT};
 use crate::merge::variant::{MergePermutation, Variant};
 use crate::scene::{LightMethod, Scene};
 use crate::scene_buffers::SceneBuffers;
 use crate::sharp::SharpPermutation;
-use ash::vk;
 
 /// The permutation with its variant less the texel views or uniform blocks that cannot hold the scene.
 pub(super) fn usable(
@@ -18,12 +17,11 @@ pub(super) fn usable(
     entity_count: usize,
     permutation: MergePermutation,
 ) -> MergePermutation {
-    let floats = vk::Format::R32G32B32A32_SFLOAT;
     let entity_room = entity_count.max(permutation.entity_limit as usize);
     let fits = TexelView::fits(device, permutation.field_format(), buffers.fields.size_bytes)
-        && TexelView::fits(device, floats, buffers.transfers.size_bytes)
-        && TexelView::fits(device, floats, buffers.vertices.size_bytes)
-        && TexelView::fits(device, floats, (entity_room * size_of::<DeviceEntity>()) as u64);
+        && TexelView::fits(device, QUAD_FORMAT, buffers.transfers.size_bytes)
+        && TexelView::fits(device, QUAD_FORMAT, buffers.vertices.size_bytes)
+        && TexelView::fits(device, QUAD_FORMAT, (entity_room * size_of::<DeviceEntity>()) as u64);
     let variant = permutation.variant.restricted(fits, entity_count <= permutation.entity_limit as usize);
     if variant != permutation.variant {
         log::info!(

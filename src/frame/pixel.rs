@@ -4,7 +4,7 @@ use crate::draw::DrawnMesh;
 use crate::draw::pixel_light::ByPixel;
 use crate::error::Result;
 use crate::gpu::{Device, TexelView, Upload};
-use crate::layout::{self, CLUSTER_VERTICES, ENTRY_FORMAT};
+use crate::layout::{self, CLUSTER_VERTICES, ENTRY_FORMAT, QUAD_FORMAT};
 use crate::lists::gather::EntityBounds;
 use crate::lists::incremental::{ClusterLists, State};
 use crate::scene::Scene;
@@ -66,7 +66,7 @@ impl PixelChains {
     pub fn is_ready(&self) -> bool {
         let device = self.entries.device();
         self.known.is_some()
-            && TexelView::fits(device, vk::Format::R32G32B32A32_SFLOAT, self.entities.size_bytes)
+            && TexelView::fits(device, QUAD_FORMAT, self.entities.size_bytes)
             && TexelView::fits(device, ENTRY_FORMAT, self.entries.size_bytes)
             && TexelView::fits(device, vk::Format::R32G32_UINT, self.chains.size_bytes)
     }

@@ -17,7 +17,7 @@ use crate::asset::environment::Environment;
 use crate::error::Result;
 use crate::gpu::texture::Level;
 use crate::gpu::{Bind, Buffer, Commands, ComputePipeline, Device, TexelView, Texture, Upload};
-use crate::layout::{CLUSTER_VERTICES, GlossEntity, NONE, SHOWN_LIGHTS};
+use crate::layout::{CLUSTER_VERTICES, GlossEntity, NONE, QUAD_FORMAT, SHOWN_LIGHTS};
 use crate::shaders::{Library, ShaderPermutation};
 use ash::vk;
 use half::f16;
@@ -48,8 +48,6 @@ pub const WIDENED: f64 = 0.35;
 pub const MOST_SLOPES: f64 = 1.0;
 /// A light counts as one part where the square of the sine of its radius is below this share of that of alpha.
 pub const WHOLE_LIGHT: f64 = 0.05;
-
-const QUADS: vk::Format = vk::Format::R32G32B32A32_SFLOAT;
 
 /// A receiver that reflects: its vertices in the buffers of light.
 #[derive(Clone, Copy, Debug)]
@@ -210,7 +208,7 @@ impl Reflections {
     /// Computes what every vertex reflects.
     pub fn record<'r>(&'r self, commands: &mut Commands<'r>, inputs: &ReflectionInputs<'r>) -> Result<()> {
         let read = |buffer: &'r Buffer| -> Result<Bind<'r>> {
-            Ok(if self.texels { Bind::Texel(TexelView::new(buffer, QUADS)?) } else { Bind::Buffer(buffer) })
+            Ok(if self.texels { Bind::Texel(TexelView::new(buffer, QUAD_FORMAT)?) } else { Bind::Buffer(buffer) })
         };
         let resources = [
             Bind::Buffer(&self.entities),
@@ -252,13 +250,15 @@ impl<'b> DrawnReflections<'b> {
     /// Whether a device's texel views hold what pixels read.
     pub fn fit(device: &Device, light_bytes: u64, vertices: &Buffer, entity_count: usize) -> bool {
         let entities = (entity_count * size_of::<GlossEntity>()) as u64;
-        [2 * light_bytes, vertices.size_bytes, entities].into_iter().all(|bytes| TexelView::fits(device, QUADS, bytes))
+        [2 * light_bytes, vertices.size_bytes, entities]
+            .into_iter()
+            .all(|bytes| TexelView::fits(device, QUAD_FORMAT, bytes))
     }
 
     /// Bindings from GLOSS_BINDING on: entities, what vertices reflect, shares of lights, sky map and lobes.
     pub fn binds(&self) -> Result<Vec<Bind<'b>>> {
         let of = self.reflections;
-        let texels = |buffer| TexelView::new(buffer, QUADS).map(Bind::Texel);
+        let texels = |buffer| TexelView::new(buffer, QUAD_FORMAT).map(Bind::Texel);
         Ok(vec![
             texels(&*of.entities)?,
             texels(&of.reflected)?,

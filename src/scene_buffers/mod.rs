@@ -14,7 +14,7 @@ use crate::draw::DrawnMesh;
 use crate::error::Result;
 use crate::field::ShadowField;
 use crate::field::extent::Extent;
-use crate::field::quantity::{Storage, channel_stride};
+use crate::field::quantity::channel_stride;
 use crate::field::self_visibility::{self, BYTES};
 use crate::field::sheet::Rectangle;
 use crate::gpu::{Buffer, Device, Texture};
@@ -98,12 +98,8 @@ pub struct SceneBuffers {
     surface_of: Vec<usize>,
     /// The bakes that were not found in the cache.
     pub baked: Vec<Baked>,
-    /// Number format of the fields.
-    pub storage: Storage,
     /// SH bands of radiance fields and transfers.
     pub bands: usize,
-    /// SH bands of occlusion fields.
-    pub field_bands: usize,
 }
 
 /// Vertices and their own visibility on their way into the buffers of a scene.
@@ -210,9 +206,7 @@ impl SceneBuffers {
             })?,
             surface_of: baked.surface_of,
             baked: baked.baked,
-            storage: options.storage,
             bands: options.bands,
-            field_bands: options.occlusion_bands(),
         })
     }
 

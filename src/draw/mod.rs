@@ -181,11 +181,11 @@ pub struct DrawnViewport<'d> {
 
 /// How pictures evaluate sharp lights themselves.
 #[derive(Clone, Copy)]
-pub struct PictureLights<'p> {
+pub struct PictureLights {
     /// By pixels, where they do.
-    pub pixels: Option<&'p SharpPermutation>,
+    pub pixels: Option<SharpPermutation>,
     /// For highlights, where the scene has such lights.
-    pub highlights: Option<&'p SharpPermutation>,
+    pub highlights: Option<SharpPermutation>,
 }
 
 /// What pipelines are made of that draw into the same images.
@@ -246,22 +246,17 @@ impl Draw {
         [width, height]: [u32; 2],
         antialias: Antialias,
         finish: Finish,
-        lights: PictureLights<'_>,
+        lights: PictureLights,
     ) -> Result<Self> {
         let samples = antialias.samples(device);
         let color = if finish == Finish::Display { SHOWN } else { COLOR };
         let shape = ImageShape { format: color, width, height, samples: 1 };
         let state = GraphicsState { depth: Some(DEPTH), samples, ..GraphicsState::plain(color) };
         let display = finish == Finish::Display;
-        let maker = PipelineMaker {
-            device: device.clone(),
-            library: library.clone(),
-            state,
-            display,
-            sharp: lights.pixels.copied(),
-        };
+        let maker =
+            PipelineMaker { device: device.clone(), library: library.clone(), state, display, sharp: lights.pixels };
         Ok(Draw {
-            triangles: DrawTriangles::new(maker.clone(), lights.highlights.copied()),
+            triangles: DrawTriangles::new(maker.clone(), lights.highlights),
             grid: DrawGrid::new(maker),
             samples: (samples > 1)
                 .then(|| Image::new(device, "draw samples", ImageShape { samples, ..shape }))

@@ -185,8 +185,7 @@ impl Frame {
         let edges = pixels.is_some();
         let sharp =
             sharp.map(|fitting| Sharp::new(device, library, SharpPermutation { edges, ..fitting })).transpose()?;
-        let highlights = sharp.as_ref().map(|sharp| sharp.permutation);
-        let lights = PictureLights { pixels: pixels.as_ref(), highlights: highlights.as_ref() };
+        let lights = PictureLights { pixels, highlights: sharp.as_ref().map(|sharp| sharp.permutation) };
         let entity_room = entity_count.max(merge.permutation.entity_limit as usize);
         let mut sky = SkyLight::new(device, options.bake.bands)?;
         sky.write(&scene, options.bake.bands)?;

@@ -33,39 +33,15 @@ pub(super) struct FramePicture {
 
 impl FramePicture {
     /// Makes linear pictures of the size in `options`.
-    pub fn new(device: &Arc<Device>, library: &Library, options: &Options, lights: PictureLights<'_>) -> Result<Self> {
+    pub fn new(device: &Arc<Device>, library: &Library, options: &Options, lights: PictureLights) -> Result<Self> {
         Ok(FramePicture {
-            draw: draw(device, library, options, Finish::Linear, lights)?,
+            draw: Draw::new(device, library, options.size, options.antialias, Finish::Linear, lights)?,
             readback: readback(device, options.size)?,
             lines: Lines::new(device)?,
             prepared: Vec::new(),
             edges: Vec::new(),
         })
     }
-
-    /// The picture that was read back last: linear RGB, three floats a pixel.
-    fn read(&self) -> Vec<f32> {
-        let shape = self.draw.picture.shape;
-        let pixels = (shape.width * shape.height) as usize;
-        if self.draw.finish() == Finish::Display {
-            let bytes: Vec<u8> = self.readback.read(0, 4 * pixels);
-            let linear = |byte: u8| linear_from_srgb(f32::from(byte) / 255.0);
-            return bytes.chunks_exact(4).flat_map(|p| [linear(p[0]), linear(p[1]), linear(p[2])]).collect();
-        }
-        let halves: Vec<f16> = self.readback.read(0, 4 * pixels);
-        halves.chunks_exact(4).flat_map(|p| [p[0].to_f32(), p[1].to_f32(), p[2].to_f32()]).collect()
-    }
-}
-
-/// The pass "draw" for pictures as options want them.
-fn draw(
-    device: &Arc<Device>,
-    library: &Library,
-    options: &Options,
-    finish: Finish,
-    lights: PictureLights<'_>,
-) -> Result<Draw> {
-    Draw::new(device, library, options.size, options.antialias, finish, lights)
 }
 
 /// Room for a picture of either finish.
@@ -104,15 +80,23 @@ impl Frame {
     /// The last picture: linear RGB, three floats a pixel, rows from the top. A picture made for a screen is decoded:
     /// white is 1.
     pub fn picture(&self) -> Vec<f32> {
-        self.picture.read()
+        let shape = self.picture.draw.picture.shape;
+        let pixels = (shape.width * shape.height) as usize;
+        if self.picture.draw.finish() == Finish::Display {
+            let bytes: Vec<u8> = self.picture.readback.read(0, 4 * pixels);
+            let linear = |byte: u8| linear_from_srgb(f32::from(byte) / 255.0);
+            return bytes.chunks_exact(4).flat_map(|p| [linear(p[0]), linear(p[1]), linear(p[2])]).collect();
+        }
+        let halves: Vec<f16> = self.picture.readback.read(0, 4 * pixels);
+        halves.chunks_exact(4).flat_map(|p| [p[0].to_f32(), p[1].to_f32(), p[2].to_f32()]).collect()
     }
 
     /// Makes pictures with these options from now on. Returns the pass that made them so far.
     pub(super) fn set_pictures(&mut self, options: Options, finish: Finish) -> Result<Draw> {
         let sharp = self.sharp.as_ref().map(|sharp| sharp.permutation);
         let pixels = pixel_shading(&self.device, &options, &self.buffers, self.radiosity.soft(), sharp);
-        let lights = PictureLights { pixels: pixels.as_ref(), highlights: sharp.as_ref() };
-        let draw = draw(&self.device, &self.library, &options, finish, lights)?;
+        let lights = PictureLights { pixels, highlights: sharp };
+        let draw = Draw::new(&self.device, &self.library, options.size, options.antialias, finish, lights)?;
         self.options = options;
         self.pixels = pixels;
         Ok(std::mem::replace(&mut self.picture.draw, draw))

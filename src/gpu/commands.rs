@@ -102,7 +102,9 @@ impl<'r> Commands<'r> {
             )
         };
         if self.separates_passes() {
-            self.timestamp_barrier(stage);
+            // It orders execution and makes no memory visible. llvmpipe takes a timestamp when it next rasterises or
+            // meets a barrier, not at its place among dispatches.
+            self.memory_barrier(vk::MemoryBarrier2::default().src_stage_mask(stage).dst_stage_mask(stage));
         }
     }
 
@@ -111,13 +113,6 @@ impl<'r> Commands<'r> {
     /// replace one between passes.
     pub fn separates_passes(&self) -> bool {
         self.recording.device.info.is_software()
-    }
-
-    /// The barrier of [`Commands::separates_passes`], after a timestamp. It orders execution and makes no memory
-    /// visible. llvmpipe takes a timestamp when it next rasterises or meets a barrier, not at its place among
-    /// dispatches.
-    fn timestamp_barrier(&self, stage: vk::PipelineStageFlags2) {
-        self.memory_barrier(vk::MemoryBarrier2::default().src_stage_mask(stage).dst_stage_mask(stage));
     }
 
     fn memory_barrier(&self, barrier: vk::MemoryBarrier2<'_>) {

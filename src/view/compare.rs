@@ -1,13 +1,33 @@
-//! The viewer's ray-cast reference, which a background task computes, and the error of the merge against it.
+//! The viewer's ray-cast reference, which a background task casts, first coarsely, then more finely while nothing
+//! changes; and the error of the merge against it.
 
 use super::command::Changed;
-use super::reference;
 use super::status::ErrorScale;
-use super::task::BackgroundTask;
+use super::task::{BackgroundTask, TaskWorker};
 use super::viewer::{ERROR, REFERENCE, Viewer};
 use crate::asset::false_color::NEUTRAL;
 use crate::error::Result;
+use crate::scene::{Placement, Scene};
 use crate::truth::error_map::{self, ErrorMap};
+use crate::truth::{EntityRadiosity, RayCast, RayMeshes, World, raycast, receiver_vertices};
+
+/// Rays per vertex and light in each round; a round does not reuse the previous one.
+const ROUNDS: [u32; 3] = [32, 256, 2048];
+/// Independent runs per round, for the standard error.
+const RUNS: u32 = 4;
+/// Number of vertices between two checks whether to stop.
+const CHUNK: usize = 512;
+
+/// The result of a round.
+pub(super) struct Reference {
+    /// Version of the light for which it was cast, as the caller counts versions.
+    pub(super) version: u64,
+    /// Rays per vertex and light.
+    pub(super) rays: u32,
+    /// Relative standard error.
+    pub(super) error: f64,
+    pub(super) radiosity: Vec<EntityRadiosity>,
+}
 
 impl Viewer {
     /// Starts casting rays if they are wanted, receives results, and compares.
@@ -37,7 +57,7 @@ impl Viewer {
         {
             let scene = self.editor.scene().clone();
             let placements = self.editor.placements();
-            self.rays = Some(reference::cast(scene, placements, self.version, self.setup.seed));
+            self.rays = Some(cast(scene, placements, self.version, self.setup.seed));
             self.rays_version = self.version;
         }
         if self.editor.error && current && !self.pending.light() {
@@ -68,4 +88,40 @@ impl Viewer {
         self.pending |= Changed { display: true, ..Changed::default() };
         Ok(())
     }
+}
+
+/// Starts casting for the current state of a scene.
+fn cast(scene: Scene, placements: Vec<Placement>, version: u64, seed: u64) -> BackgroundTask<Reference> {
+    BackgroundTask::new(move |worker: &TaskWorker<Reference>| {
+        let shapes = RayMeshes::new(&scene);
+        let world = World::new(&scene, &shapes, &placements);
+        for rays in ROUNDS {
+            let rays = RayCast { rays, runs: RUNS, seed, ..RayCast::default() };
+            worker.send(round(&scene, &world, rays, version, worker)?);
+        }
+        Ok(())
+    })
+}
+
+fn round(
+    scene: &Scene,
+    world: &World<'_>,
+    cast: RayCast,
+    version: u64,
+    worker: &TaskWorker<Reference>,
+) -> Result<Reference> {
+    let vertices = receiver_vertices(scene);
+    let mut lit = Vec::with_capacity(vertices.len());
+    for chunk in vertices.chunks(CHUNK) {
+        worker.report(&format!("{} rays a vertex", cast.rays), lit.len() as u32, vertices.len() as u32);
+        lit.extend(cast.run(world, chunk));
+    }
+    let mut radiosity: Vec<EntityRadiosity> = Vec::new();
+    for (vertex, estimate) in vertices.iter().zip(&lit) {
+        if radiosity.last().is_none_or(|(entity, _)| *entity != vertex.entity) {
+            radiosity.push((vertex.entity, Vec::new()));
+        }
+        radiosity.last_mut().expect("just pushed").1.push(estimate.radiosity.map(|c| c as f32));
+    }
+    Ok(Reference { version, rays: cast.rays, error: raycast::relative_error(&lit), radiosity })
 }

@@ -36,7 +36,6 @@ mod picker;
 mod picture;
 #[cfg(feature = "view")]
 mod preview;
-pub mod reference;
 pub mod reload;
 mod save;
 pub mod scenes;

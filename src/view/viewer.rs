@@ -4,10 +4,10 @@
 
 use super::Editor;
 use super::command::{Changed, Command, Effect};
+use super::compare::Reference;
 use super::input::{Event, Input};
 use super::overlay::{Overlay, Paint};
 use super::panel;
-use super::reference::Reference;
 use super::reload::Watch;
 use super::status::ErrorScale;
 use super::task::{BackgroundTask, TaskProgress};

@@ -3,7 +3,7 @@
 use super::command::{Changed, Command, Effect, Panel};
 use super::history::History;
 use super::orbit_camera::OrbitCamera;
-use super::picker::{EntityDrag, Picker};
+use super::pick::{EntityDrag, Shapes, unbuilt_shapes};
 use crate::asset::enclose::around_spheres;
 use crate::asset::environment::EnvironmentData;
 use crate::asset::sky::Sky;
@@ -44,7 +44,7 @@ pub struct Editor {
     pub(super) history: History,
     /// Emission of each entity before it stopped being a light.
     pub(super) former_emission: Vec<Option<Vec3>>,
-    pub(super) picker: Picker,
+    pub(super) shapes: Shapes,
     pub(super) drag: Option<EntityDrag>,
     /// Files that were written since the start, for any scene.
     pub(super) saved: HashSet<PathBuf>,
@@ -83,7 +83,7 @@ impl Editor {
             variant: None,
             history: History::default(),
             former_emission: vec![None; scene.entities.len()],
-            picker: Picker::new(scene.meshes.len()),
+            shapes: unbuilt_shapes(&scene),
             drag: None,
             saved: HashSet::new(),
             kept: scene.data.clone(),

@@ -31,7 +31,6 @@ mod overlay;
 #[cfg(feature = "view")]
 pub mod panel;
 pub mod pick;
-mod picker;
 #[cfg(feature = "view")]
 mod picture;
 #[cfg(feature = "view")]

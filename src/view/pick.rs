@@ -4,11 +4,11 @@ use super::command::{Changed, Command, Effect};
 use super::edit;
 use super::editor::Editor;
 use super::history::{EditKind, Snapshot};
-use super::picker::EntityDrag;
 use crate::draw::camera::through_pixels;
-use crate::scene::{EntityData, Placement};
+use crate::scene::{EntityData, Placement, Scene};
 use crate::truth::ray_mesh::RayMesh;
 use glam::DVec3;
+use std::sync::OnceLock;
 
 /// A drag reaches at most this many scene radii from the eye, because near the horizon a pixel covers kilometres.
 const REACH: f64 = 30.0;
@@ -17,6 +17,22 @@ const REACH: f64 = 30.0;
 pub struct Ray {
     pub origin: DVec3,
     pub direction: DVec3,
+}
+
+/// Hierarchies of the scene's meshes, each built when a ray first enters its bounding sphere.
+pub(super) type Shapes = Vec<OnceLock<RayMesh>>;
+
+/// An entity that is being dragged, and the other pieces of the same thing.
+pub(super) struct EntityDrag {
+    /// As they were before.
+    pub(super) before: Vec<(usize, EntityData)>,
+    /// The point where it was grabbed, metres.
+    anchor: DVec3,
+    moved: bool,
+}
+
+pub(super) fn unbuilt_shapes(scene: &Scene) -> Shapes {
+    scene.meshes.iter().map(|_| OnceLock::new()).collect()
 }
 
 impl Editor {
@@ -58,7 +74,7 @@ impl Editor {
     /// Distance at which a ray that enters the bounding sphere at `enters_m` meets the mesh.
     fn meets(&self, entity: usize, placement: &Placement, ray: Ray, enters_m: f64) -> Option<f64> {
         let mesh = self.scene.entities[entity].mesh;
-        let shape = self.picker.shapes[mesh].get_or_init(|| RayMesh::new(&self.scene.meshes[mesh]));
+        let shape = self.shapes[mesh].get_or_init(|| RayMesh::new(&self.scene.meshes[mesh]));
         let (centre, radius_m) = self.sphere(entity, placement);
         let to_object = placement.turn().inverse();
         // The ray starts at the sphere, in units of its radius, so f32 is precise for any distance of the camera.

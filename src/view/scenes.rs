@@ -2,7 +2,7 @@
 
 use super::command::{Changed, Effect};
 use super::editor::Editor;
-use super::picker::Picker;
+use super::pick::unbuilt_shapes;
 use crate::asset::{Mesh, embedded};
 use crate::error::Result;
 use crate::scene::Scene;
@@ -22,7 +22,7 @@ impl Editor {
             .is_edited()
             .then(|| format!("the edits of {} are not saved: Ctrl-Z returns to them", self.path().display()));
         let mut former = self.replace(Editor::new(scene, path));
-        former.picker = Picker::new(former.scene.meshes.len());
+        former.shapes = unbuilt_shapes(&former.scene);
         // Z is easily pressed instead of Ctrl-Z, and a file dropped by mistake.
         let changed = former.undo_count() > 0 || former.is_edited();
         self.former = if changed { Some(Box::new(former)) } else { former.former };

@@ -47,18 +47,18 @@ impl Editor {
 
     /// The current state as scene data for a file in `folder`, so that its first picture is the one shown now. Paths in
     /// it are relative to `folder`; files of built-in scenes keep their built-in names.
-    pub fn data(&self, folder: &Path) -> Result<Data> {
+    pub fn data(&self, folder: &Path) -> Data {
         let mut data = self.scene().data.clone();
         [data.output.width, data.output.height] = self.size();
         data.output.time_s = self.time_s;
         let from = self.path().parent().unwrap_or(Path::new(""));
         data.move_files(from, folder);
-        Ok(data)
+        data
     }
 
     /// Writes the state as a scene file.
     pub fn save(&mut self, path: &Path) -> Result<()> {
-        let data = self.data(path.parent().unwrap_or(Path::new("")))?;
+        let data = self.data(path.parent().unwrap_or(Path::new("")));
         let head = "Written by shadow-fields view; `shadow-fields render` gives the same picture.";
         data.write(path, head).map_err(|error| match error {
             Error::Input(message) => Error::Failed(message),

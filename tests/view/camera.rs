@@ -24,11 +24,11 @@ fn a_scene_without_distant_light_gets_a_sky_that_is_saved() {
     let dark = SMALL.replace("[environment]\nuniform = [0.1, 0.1, 0.1]\n", "");
     let mut editor = from_text(&dark);
     assert!(editor.scene().data.environment.sky.is_some() && !editor.scene().environment.is_none());
-    let saved = Data::parse(&editor.data(Path::new("")).unwrap().to_toml().unwrap(), Path::new("d.toml")).unwrap();
+    let saved = Data::parse(&editor.data(Path::new("")).to_toml().unwrap(), Path::new("d.toml")).unwrap();
     assert_eq!(saved.environment, editor.scene().data.environment);
     // Turned off, it stays off when it is saved.
     assert!(editor.apply(Command::SetSky(0.0)).changed.sky && editor.scene().environment.is_none());
-    let saved = editor.data(Path::new("")).unwrap().to_toml().unwrap();
+    let saved = editor.data(Path::new("")).to_toml().unwrap();
     let read = |path: &Path| Err(shadow_fields::Error::input(path, "this test has no files"));
     let again = Editor::new(Scene::parse(&saved, Path::new("d.toml"), &read).unwrap(), Path::new("d.toml"));
     assert!(again.scene().environment.is_none());

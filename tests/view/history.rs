@@ -88,7 +88,7 @@ proptest! {
             done += 1;
         }
         prop_assert!(done < shadow_fields::view::history::STEP_LIMIT);
-        let saved = Data::parse(&editor.data(Path::new("")).unwrap().to_toml().unwrap(), Path::new("p.toml"));
+        let saved = Data::parse(&editor.data(Path::new("")).to_toml().unwrap(), Path::new("p.toml"));
         prop_assert!(saved.is_ok(), "{saved:?}");
         let end = editor.scene().data.clone();
         let mut undone = 0;

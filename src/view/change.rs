@@ -139,7 +139,7 @@ impl Editor {
             }
             back
         };
-        let found = if forth { self.history.redo(swap) } else { self.history.undo(swap) };
+        let found = self.history.travel(forth, swap);
         if !found
             && !forth
             && let Some(effect) = self.return_to_former()

@@ -137,7 +137,7 @@ impl Editor {
     }
 
     pub fn undo_count(&self) -> usize {
-        self.history.len()
+        self.history.undo_count()
     }
 
     /// Fields that a mesh needs for its entities' switches: occlusion, radiance.

@@ -67,30 +67,18 @@ impl History {
         self.open = None;
     }
 
-    /// Undoes the last change: `swap` restores a snapshot and returns the replaced state. Returns whether there was a
-    /// change.
-    pub fn undo(&mut self, swap: impl FnOnce(Snapshot) -> Snapshot) -> bool {
+    /// Undoes the last change, or redoes the one that was undone last: `swap` restores a snapshot and returns the
+    /// replaced state. Returns whether there was one.
+    pub fn travel(&mut self, forth: bool, swap: impl FnOnce(Snapshot) -> Snapshot) -> bool {
         self.open = None;
-        let Some(snapshot) = self.done.pop() else { return false };
-        self.undone.push(swap(snapshot));
-        true
-    }
-
-    /// Redoes the change that was undone last. Returns whether there was one.
-    pub fn redo(&mut self, swap: impl FnOnce(Snapshot) -> Snapshot) -> bool {
-        self.open = None;
-        let Some(snapshot) = self.undone.pop() else { return false };
-        self.done.push(swap(snapshot));
+        let (from, to) = if forth { (&mut self.undone, &mut self.done) } else { (&mut self.done, &mut self.undone) };
+        let Some(snapshot) = from.pop() else { return false };
+        to.push(swap(snapshot));
         true
     }
 
     /// Number of changes that can be undone.
-    pub fn len(&self) -> usize {
+    pub fn undo_count(&self) -> usize {
         self.done.len()
-    }
-
-    /// Whether no change can be undone.
-    pub fn is_empty(&self) -> bool {
-        self.done.is_empty()
     }
 }

@@ -180,22 +180,10 @@ impl Editor {
             Command::SelectNone => self.select(None),
             Command::Pick(_) | Command::DragStart(_) | Command::DragTo(_) | Command::DragEnd => self.point(command),
             Command::NextScene => self.next_scene(),
-            Command::ToggleRunning => {
-                self.running = !self.running;
-                Changed { display: true, ..unchanged }.into()
-            }
-            Command::ToggleReference => {
-                self.reference = !self.reference;
-                Changed { display: true, ..unchanged }.into()
-            }
-            Command::ToggleError => {
-                self.error = !self.error;
-                Changed { display: true, ..unchanged }.into()
-            }
-            Command::ToggleOverlay => {
-                self.overlay = !self.overlay;
-                Changed { display: true, ..unchanged }.into()
-            }
+            Command::ToggleRunning => toggle(&mut self.running),
+            Command::ToggleReference => toggle(&mut self.reference),
+            Command::ToggleError => toggle(&mut self.error),
+            Command::ToggleOverlay => toggle(&mut self.overlay),
             Command::ToggleKeys => {
                 self.panels.keys = !(self.panels.keys && self.overlay);
                 self.overlay = true;
@@ -289,4 +277,9 @@ impl Editor {
         };
         std::mem::replace(self, next)
     }
+}
+
+fn toggle(switch: &mut bool) -> Effect {
+    *switch = !*switch;
+    Changed { display: true, ..Changed::default() }.into()
 }

@@ -186,10 +186,10 @@ impl Scene {
 
         let mut readers = gltf::Readers::new(folder);
         let textures = read_textures(&data, &read, &mut readers)
-            .map_err(|(i, what)| Error::input_at(path, lines.texture(i), what))?;
+            .map_err(|(i, what)| Error::input_at(path, lines.of(lines.tables.textures.get(i)), what))?;
         let mut meshes: Vec<Arc<Mesh>> = Vec::with_capacity(data.meshes.len());
         for (i, mesh) in data.meshes.iter().enumerate() {
-            let at = |what: String| Error::input_at(path, lines.mesh(i), what);
+            let at = |what: String| Error::input_at(path, lines.of(lines.tables.meshes.get(i)), what);
             if data.meshes[..i].iter().any(|m| m.name == mesh.name) {
                 return Err(at(format!("there are two meshes {:?}", mesh.name)));
             }
@@ -197,10 +197,10 @@ impl Scene {
                 build_mesh(mesh, folder, &read, &mut readers).map_err(|e| at(format!("mesh {:?}: {e}", mesh.name)))?;
             meshes.push(Arc::new(built));
         }
-        let fail = |i, what| Error::input_at(path, lines.entity(i), what);
+        let fail = |i, what| Error::input_at(path, lines.of(lines.tables.entities.get(i)), what);
         let entities = resolve_all(&data, &meshes, &textures, fail)?;
-        let environment =
-            Environment::new(&data.environment, &read).map_err(|e| Error::input_at(path, lines.environment(), e))?;
+        let environment = Environment::new(&data.environment, &read)
+            .map_err(|e| Error::input_at(path, lines.of(lines.tables.environment.as_ref()), e))?;
         Ok(Self::assemble(data, meshes, textures, entities, environment))
     }
 
@@ -376,9 +376,8 @@ impl Scene {
             return Err(Error::Input(format!("there is no entity {index}")));
         }
         data::check(format!("entity {index}"), &data)?;
-        check_spot(&data, &self.meshes[self.entities[index].mesh])
+        check_entity(&data, &self.meshes[self.entities[index].mesh], &self.data)
             .map_err(|what| Error::Input(format!("entity {index}: {what}")))?;
-        check_textures(&data, &self.data).map_err(|what| Error::Input(format!("entity {index}: {what}")))?;
         self.put_entity(index, data);
         Ok(())
     }
@@ -398,7 +397,7 @@ impl Scene {
             let &Entity { texture, albedo, opacity: whole, .. } = &self.entities[index];
             Paint { texture, mean: albedo / opacity, opacity: whole / opacity }
         };
-        let coat = Coat::new(&data, &self.data, &self.textures, &self.meshes[mesh]);
+        let coat = coat(&data, &self.data, &self.textures, &self.meshes[mesh]);
         self.entities[index] = resolve(index, &data, mesh, paint, coat, &self.textures);
         self.data.entities[index] = data;
         if is_repainted {
@@ -446,24 +445,29 @@ fn resolve_all(
     for (i, entity) in data.entities.iter().enumerate() {
         let mesh = data.meshes.iter().position(|mesh| mesh.name == entity.mesh);
         let mesh = mesh.ok_or_else(|| fail(i, format!("there is no mesh {:?}", entity.mesh)))?;
-        check_spot(entity, &meshes[mesh]).map_err(|what| fail(i, what.to_owned()))?;
-        check_textures(entity, data).map_err(|what| fail(i, what))?;
+        check_entity(entity, &meshes[mesh], data).map_err(|what| fail(i, what))?;
         let paint = match &entity.albedo {
             Albedo::Color(_) => Paint::new(&entity.albedo, data, textures, &meshes[mesh]),
             Albedo::Texture(name) => *paints
                 .entry((name, &entity.mesh))
                 .or_insert_with(|| Paint::new(&entity.albedo, data, textures, &meshes[mesh])),
         };
-        let coat = Coat::new(entity, data, textures, &meshes[mesh]);
+        let coat = coat(entity, data, textures, &meshes[mesh]);
         entities.push(resolve(i, entity, mesh, paint, coat, textures));
     }
     Ok(entities)
 }
 
-/// Refuses a spot that would be computed by spherical harmonics, which have no cone.
-fn check_spot(data: &EntityData, mesh: &Mesh) -> std::result::Result<(), &'static str> {
-    let has_colors = mesh.colors.is_some() && mesh.panel().is_none();
-    if data.spot.is_some() && has_colors { Err("a spot takes a mesh without colours of its own") } else { Ok(()) }
+/// Refuses a spot that would be computed by spherical harmonics, which have no cone, and the names of textures that there
+/// are not.
+fn check_entity(entity: &EntityData, mesh: &Mesh, data: &Data) -> std::result::Result<(), String> {
+    if entity.spot.is_some() && mesh.colors.is_some() && mesh.panel().is_none() {
+        return Err("a spot takes a mesh without colours of its own".into());
+    }
+    let albedo = if let Albedo::Texture(name) = &entity.albedo { Some(name) } else { None };
+    let is_missing = |name: &&String| data.textures.iter().all(|texture| texture.name != **name);
+    let missing = albedo.into_iter().chain(entity.maps.names()).find(is_missing);
+    missing.map_or(Ok(()), |name| Err(format!("there is no texture {name:?}")))
 }
 
 /// The texture of an entity, its mean reflectance and its mean opacity.
@@ -489,37 +493,21 @@ impl Paint {
     }
 }
 
-/// Refuses the names of textures that there are not.
-fn check_textures(entity: &EntityData, data: &Data) -> std::result::Result<(), String> {
-    let albedo = if let Albedo::Texture(name) = &entity.albedo { Some(name) } else { None };
-    let is_missing = |name: &&String| data.textures.iter().all(|texture| texture.name != **name);
-    let missing = albedo.into_iter().chain(entity.maps.names()).find(is_missing);
-    missing.map_or(Ok(()), |name| Err(format!("there is no texture {name:?}")))
-}
-
 /// How an entity reflects besides diffusely, and its textures for that.
-struct Coat {
-    gloss: Option<Gloss>,
-    maps: MapIndices,
-}
-
-impl Coat {
-    /// Of an entity whose textures there are.
-    fn new(entity: &EntityData, data: &Data, textures: &[Arc<Texture>], mesh: &Mesh) -> Self {
-        let Some(mut gloss) = entity.gloss else { return Coat { gloss: None, maps: MapIndices::default() } };
-        let number = |name: &Option<String>| {
-            let name = name.as_ref().filter(|_| mesh.uvs.is_some())?;
-            data.textures.iter().position(|texture| texture.name == *name && texture.file.is_some())
-        };
-        let Maps { gloss: varies, normal, glow } = &entity.maps;
-        let maps = MapIndices { gloss: number(varies), normal: number(normal), glow: number(glow) };
-        if let Some(texels) = maps.gloss.and_then(|index| textures[index].texels.as_ref()) {
-            let [_, roughness, metallic] = texels.mean_bytes();
-            gloss.roughness *= roughness;
-            gloss.metallic *= metallic;
-        }
-        Coat { gloss: Some(gloss), maps }
+fn coat(entity: &EntityData, data: &Data, textures: &[Arc<Texture>], mesh: &Mesh) -> (Option<Gloss>, MapIndices) {
+    let Some(mut gloss) = entity.gloss else { return (None, MapIndices::default()) };
+    let number = |name: &Option<String>| {
+        let name = name.as_ref().filter(|_| mesh.uvs.is_some())?;
+        data.textures.iter().position(|texture| texture.name == *name && texture.file.is_some())
+    };
+    let Maps { gloss: varies, normal, glow } = &entity.maps;
+    let maps = MapIndices { gloss: number(varies), normal: number(normal), glow: number(glow) };
+    if let Some(texels) = maps.gloss.and_then(|index| textures[index].texels.as_ref()) {
+        let [_, roughness, metallic] = texels.mean_bytes();
+        gloss.roughness *= roughness;
+        gloss.metallic *= metallic;
     }
+    (Some(gloss), maps)
 }
 
 /// Resolves the switches. By default, an entity emits if it has emission, occludes unless it emits, and receives.
@@ -528,7 +516,7 @@ fn resolve(
     data: &EntityData,
     mesh: usize,
     paint: Paint,
-    coat: Coat,
+    (gloss, maps): (Option<Gloss>, MapIndices),
     textures: &[Arc<Texture>],
 ) -> Entity {
     let emits = data.emits.unwrap_or(data.emission != Vec3::ZERO);
@@ -537,8 +525,8 @@ fn resolve(
         mesh,
         albedo: data.opacity * paint.mean,
         texture: paint.texture,
-        gloss: coat.gloss,
-        maps: coat.maps,
+        gloss,
+        maps,
         opacity: data.opacity * paint.opacity,
         transparent: data.opacity < 1.0 || paint.texture.is_some_and(|texture| textures[texture].alpha_blend),
         emission: data.emission,
@@ -643,23 +631,7 @@ impl<'a> TableLines<'a> {
         Self { text, tables: toml::from_str(text).unwrap_or_default() }
     }
 
-    fn line(&self, table: Option<&Spanned<toml::Table>>) -> usize {
+    fn of(&self, table: Option<&Spanned<toml::Table>>) -> usize {
         table.map_or(1, |t| data::line_of(self.text, t.span().start))
-    }
-
-    fn texture(&self, index: usize) -> usize {
-        self.line(self.tables.textures.get(index))
-    }
-
-    fn mesh(&self, index: usize) -> usize {
-        self.line(self.tables.meshes.get(index))
-    }
-
-    fn entity(&self, index: usize) -> usize {
-        self.line(self.tables.entities.get(index))
-    }
-
-    fn environment(&self) -> usize {
-        self.line(self.tables.environment.as_ref())
     }
 }

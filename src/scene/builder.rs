@@ -126,16 +126,8 @@ impl SceneBuilder {
             named.push(MeshData::new(name, generator));
         }
         let mut textures: Vec<TextureData> = Vec::with_capacity(painted.len());
-        for (name, Texture { wrap, factor, alpha_cutoff, alpha_blend, .. }) in &painted {
-            let data = TextureData {
-                name: name.clone(),
-                file: None,
-                image: None,
-                wrap: *wrap,
-                factor: *factor,
-                alpha_cutoff: *alpha_cutoff,
-                alpha_blend: *alpha_blend,
-            };
+        for (name, texture) in &painted {
+            let data = TextureData::of(name.clone(), texture);
             let fail = |what| Error::Input(format!("texture {:?}: {what}", data.name));
             data.check(&textures).map_err(fail)?;
             textures.push(data);

@@ -53,7 +53,7 @@ use super::motion::{Motion, Placement, PlacementF64, RotationData};
 use super::{check_counts, values};
 use crate::asset::Generator;
 use crate::asset::environment::EnvironmentData;
-use crate::asset::texture::Wrap;
+use crate::asset::texture::{Texture, Wrap};
 use crate::error::{Error, Result, one_line};
 
 /// Largest width or height of a picture, in pixels.
@@ -242,6 +242,19 @@ pub struct TextureData {
 }
 
 impl TextureData {
+    /// A texture without the file of its picture.
+    pub(super) fn of(name: String, texture: &Texture) -> Self {
+        TextureData {
+            name,
+            file: None,
+            image: None,
+            wrap: texture.wrap,
+            factor: texture.factor,
+            alpha_cutoff: texture.alpha_cutoff,
+            alpha_blend: texture.alpha_blend,
+        }
+    }
+
     /// A name that is not taken by textures before, an image of a glTF file alone, and an alpha within 0 to 1.
     pub(super) fn check(&self, before: &[TextureData]) -> std::result::Result<(), String> {
         if before.iter().any(|other| other.name == self.name) {

@@ -170,7 +170,7 @@ fn receivers_and_lights_within_the_bounding_sphere_see_what_lies_between_them() 
         (generate::teapot(3), [0.03, 0.04]),
         (table(), [0.085, 0.1]),
         (generate::cuboid(Vec3::new(2.0, 0.01, 2.0), 4), [0.06, 0.085]),
-        // Its outline is exact; that of a drawn view came to just below 0.1.
+        // Its outline is exact; that of a drawn view stays below 0.1.
         (generate::cuboid(Vec3::new(0.5, 1.0, 0.8), 4), [0.03, 0.105]),
     ] {
         let field = bake(&gpu, &mesh, SilhouetteOptions::default());

@@ -225,9 +225,7 @@ impl Reader {
         if image >= self.document.root.images.len() {
             return Err(fail("there is no such image"));
         }
-        self.textures
-            .texels(image)?
-            .ok_or_else(|| self.document.fail(format!("images[{image}]"), "its format is not read"))
+        self.textures.texels(image)?.ok_or_else(|| fail("its format is not read"))
     }
 
     /// The mesh of a part under a bend.
@@ -446,9 +444,8 @@ impl Builder {
         let albedo = self.albedo(part);
         let [gloss_map, normal_map, glow_map] = maps.map(|map| map.map(|map| self.map(map)));
         let made = self.mesh(part, bend)?;
-        let several = document.root.meshes[mesh].primitives.len() > 1;
         let mut name = document.root.nodes[stand.node].name.clone().unwrap_or_else(|| format!("node {}", stand.node));
-        if several {
+        if document.root.meshes[mesh].primitives.len() > 1 {
             name = format!("{name} {at}");
         }
         if let Some(piece) = part.piece {
@@ -483,15 +480,10 @@ impl Builder {
             let own = material.and_then(|index| self.reader.document.root.materials[index].name.clone());
             let own = own.unwrap_or_else(|| material.map_or("paint".into(), |index| format!("material {index}")));
             let is_free = |name: &String| self.textures.iter().all(|(data, _)| data.name != *name);
-            let Texture { wrap, factor, alpha_cutoff, alpha_blend, .. } = paint.texture;
             let data = TextureData {
-                name: free_name(&own, is_free),
                 file: paint.image.map(|_| self.file.clone()),
                 image: paint.image,
-                wrap,
-                factor,
-                alpha_cutoff,
-                alpha_blend,
+                ..TextureData::of(free_name(&own, is_free), &paint.texture)
             };
             self.textures.push((data, Arc::new(paint.texture.clone())));
             self.textures.len() - 1
@@ -503,17 +495,13 @@ impl Builder {
     fn map(&mut self, map: Map) -> String {
         let number = *self.mapped.entry(map).or_insert_with(|| {
             let is_free = |name: &String| self.textures.iter().all(|(data, _)| data.name != *name);
-            let data = TextureData {
-                name: free_name(&format!("image {}", map.image), is_free),
-                file: Some(self.file.clone()),
-                image: Some(map.image),
-                wrap: map.wrap,
-                factor: Vec3::ONE,
-                alpha_cutoff: None,
-                alpha_blend: false,
-            };
             let texels = self.reader.texels(map.image).ok();
             let texture = Texture { texels, wrap: map.wrap, factor: Vec3::ONE, alpha_cutoff: None, alpha_blend: false };
+            let data = TextureData {
+                file: Some(self.file.clone()),
+                image: Some(map.image),
+                ..TextureData::of(free_name(&format!("image {}", map.image), is_free), &texture)
+            };
             self.textures.push((data, Arc::new(texture)));
             self.textures.len() - 1
         });
@@ -533,8 +521,7 @@ impl Builder {
         let Some(Some(primitive)) = self.reader.primitives.get(&part.key()) else {
             unreachable!("the primitive was read")
         };
-        let is_turned = (bend.transpose() * bend).abs_diff_eq(DMat3::IDENTITY, 1e-9) && bend.determinant() > 0.0;
-        let is_bent = !is_turned;
+        let is_bent = !((bend.transpose() * bend).abs_diff_eq(DMat3::IDENTITY, 1e-9) && bend.determinant() > 0.0);
         self.bent_count += usize::from(is_bent);
         // Meshes of lamps have names of their own.
         let own = primitive.name.strip_prefix(lamp::BALL).map(|rest| format!("a {}{rest}", lamp::BALL));

@@ -27,6 +27,7 @@ void note_share(uint light, float irradiance) {
 float finest;       // distance over width, for the narrowest penumbra of the current light that comes as near as the next vertex, or 0
 float missed = 0.0; // most, over all lights, of the square of `finest` times the light
 float open_light = 0.0; // of all lights, nothing between
+float curved;       // irradiance by the current light, each part's by the square of the step over its distance, of radiance 1
 #endif
 
 #if EDGES || STATES
@@ -113,21 +114,10 @@ void find_rim(float ramp, Entity shining, float step) {
     finest = max(finest, near ? min(2.0 * change, MOST_STEPS) : 0.0);
 }
 
-void add_open(float irradiance, float cone, float curved, Entity shining) {
+void add_open(float irradiance, float cone, Entity shining) {
     float white = dot(shining.emission, vec3(1.0)), light = irradiance * white;
     open_light += light * cone;
     missed = max(missed, max(finest * finest * light, NEAR_LIGHT * curved * cone * white));
-}
-
-// Of the irradiance by each part, the share by which a straight line to the next vertex may miss it: the square of the
-// step over the distance.
-vec4 curvature(Surface surface, SeenLight light, Block block) {
-    vec4 ratio;
-    EACH for (uint k = 0; k < 4; k++) {
-        vec2 part = part_place(light, block, k);
-        ratio[k] = surface.step / max(reach_of(light, part, along_axes(light, part)), 1e-30);
-    }
-    return min(ratio * ratio, vec4(1.0));
 }
 #endif
 
@@ -245,6 +235,10 @@ vec4 part_shares(Surface surface, SeenLight light, Block block) {
 #endif
         float unit = block.weight * part_light(light, block, part, along);
         share[k] = unit * sum;
+#if EDGES
+        float steps = surface.step * surface.inverse_radius / max(reach, 1e-30);
+        curved += share[k] * min(steps * steps, 1.0);
+#endif
 #if SHOWN
         open_share += unit * open;
 #endif
@@ -336,7 +330,8 @@ vec3 chain_sum(Surface surface, Entity shining, bool open, uint first, uint coun
     open_share = 0.0;
 #endif
 #if EDGES
-    float unblocked = 0.0, passed = 0.0, curved = 0.0;
+    float unblocked = 0.0, passed = 0.0;
+    curved = 0.0;
     float nearest = 0.0; // `finest` of all occluders
     bool hidden = !open; // every block behind one occluder whose own edges are far
 #endif
@@ -346,7 +341,6 @@ vec3 chain_sum(Surface surface, Entity shining, bool open, uint first, uint coun
         vec4 share = part_shares(surface, light, block);
 #if EDGES
         unblocked += dot(share, vec4(1.0));
-        curved += dot(share, curvature(surface, light, block));
 #endif
         if (!open) {
             j = i;
@@ -417,7 +411,7 @@ vec3 chain_sum(Surface surface, Entity shining, bool open, uint first, uint coun
 #if EDGES
     finest = hidden ? 0.0 : nearest;
     find_rim(ramp, shining, surface.step / max(light.distance, 1e-30));
-    add_open(unblocked, cone, curved, shining);
+    add_open(unblocked, cone, shining);
     uint state = finest > 0.0 ? CUT : passed >= 0.999 * unblocked ? OPEN : passed <= 0.001 * unblocked ? DARK : CUT;
     light_states |= state << state_bit(chain_light(entry_at(first + j)));
 #endif

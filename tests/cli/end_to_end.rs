@@ -20,7 +20,8 @@ fn picture(folder: &Folder, name: &str) -> image::RgbImage {
 
 /// Asserts that a PNG is the EXR in sRGB, except where a sample of the pixel is brighter than white: near what is.
 fn assert_encodes(png: &image::RgbImage, exr: &image::Rgb32FImage, gain: f32) {
-    let (mut same, mut clamped) = (0, 0);
+    let mut same = 0;
+    let mut clamped = 0;
     for (x, y, p) in png.enumerate_pixels() {
         let linear = exr.get_pixel(x, y).0;
         let around = (y.saturating_sub(1)..(y + 2).min(64))

@@ -144,7 +144,8 @@ fn a_light_that_faces_away_is_left_off() {
     let lamp = scene.meshes[1].clone();
     let painted = |color: fn(&Vec3) -> Vec3| {
         let colors = lamp.normals.iter().map(color).collect();
-        let (positions, normals) = (lamp.positions.clone(), lamp.normals.clone());
+        let positions = lamp.positions.clone();
+        let normals = lamp.normals.clone();
         Mesh::new("lamp", positions, normals, Some(colors), lamp.triangles.clone()).unwrap().into()
     };
     scene.meshes[1] = painted(|normal| if normal.y > 0.5 { Vec3::ONE } else { Vec3::ZERO });

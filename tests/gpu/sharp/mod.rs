@@ -193,6 +193,12 @@ fn picture(gpu: &Gpu, scene: &Scene, shading: Shading) -> (Vec<f32>, Option<u64>
     (frame.picture(), frame.pixels_evaluated(&timings))
 }
 
+/// Root mean square difference of two pictures.
+fn rms_apart(one: &[f32], other: &[f32]) -> f64 {
+    let square = |(a, b): (&f32, &f32)| f64::from(a - b).powi(2);
+    (one.iter().zip(other).map(square).sum::<f64>() / other.len() as f64).sqrt()
+}
+
 /// On floors and slabs of few cells pixels show what the vertices of fine ones show, and the coarse ones' own vertices
 /// do not.
 #[test]
@@ -208,12 +214,9 @@ fn pixels_carry_edges_that_vertices_do_not() {
     };
     let plane = "plane = { size_m = 6";
     let fine = show(plane, 300, Shading::Vertex);
-    let rms = |of: Vec<f32>| {
-        let square = |(a, b): (&f32, &f32)| f64::from(a - b).powi(2);
-        (of.iter().zip(&fine).map(square).sum::<f64>() / fine.len() as f64).sqrt()
-    };
     for receiver in [plane, "cuboid = { size_m = [6, 0.0001, 6]"] {
-        let [pixels, vertices] = [Shading::Pixel, Shading::Vertex].map(|shading| rms(show(receiver, 12, shading)));
+        let [pixels, vertices] =
+            [Shading::Pixel, Shading::Vertex].map(|shading| rms_apart(&show(receiver, 12, shading), &fine));
         assert!(pixels < 0.2 * vertices && vertices > 0.004, "{receiver}: {pixels} and {vertices}");
     }
 }
@@ -238,11 +241,7 @@ fn pixels_carry_edges_of_two_lamps_and_a_wall() {
         picture(&gpu, &scene, shading).0
     };
     let fine = show(300, Shading::Vertex);
-    let rms = |of: Vec<f32>| {
-        let square = |(a, b): (&f32, &f32)| f64::from(a - b).powi(2);
-        (of.iter().zip(&fine).map(square).sum::<f64>() / fine.len() as f64).sqrt()
-    };
-    let [pixels, vertices] = [Shading::Pixel, Shading::Vertex].map(|shading| rms(show(12, shading)));
+    let [pixels, vertices] = [Shading::Pixel, Shading::Vertex].map(|shading| rms_apart(&show(12, shading), &fine));
     assert!(pixels < 0.2 * vertices && vertices > 0.004, "{pixels} and {vertices}");
 }
 
@@ -257,11 +256,7 @@ fn pixels_carry_light_of_a_lamp_that_is_near() {
         picture(&gpu, &parse(&format!("{head}{lamp}")), shading).0
     };
     let fine = show(300, Shading::Vertex);
-    let rms = |of: Vec<f32>| {
-        let square = |(a, b): (&f32, &f32)| f64::from(a - b).powi(2);
-        (of.iter().zip(&fine).map(square).sum::<f64>() / fine.len() as f64).sqrt()
-    };
-    let [pixels, vertices] = [Shading::Pixel, Shading::Vertex].map(|shading| rms(show(8, shading)));
+    let [pixels, vertices] = [Shading::Pixel, Shading::Vertex].map(|shading| rms_apart(&show(8, shading), &fine));
     assert!(pixels < 0.1 * vertices && vertices > 0.01, "{pixels} and {vertices}");
 }
 

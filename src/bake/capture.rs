@@ -141,7 +141,7 @@ impl Capture {
         } else {
             let depth_shape = ImageShape { format: vk::Format::D32_SFLOAT, ..shape };
             let depth = radiance.then(|| Image::new(device, "capture depth", depth_shape)).transpose()?;
-            Writer::Drawn { pipeline: Self::pipeline(device, library, &model, format, kind)?, depth }
+            Writer::Drawn { pipeline: Self::pipeline(device, library, format, kind)?, depth }
         };
         Ok(Capture { model, writer, atlas: Image::new(device, "capture atlas", shape)?, face_px, columns, kind })
     }
@@ -149,15 +149,12 @@ impl Capture {
     fn pipeline(
         device: &Arc<Device>,
         library: &Library,
-        model: &Model,
         color: vk::Format,
         kind: FieldKind,
     ) -> Result<GraphicsPipeline> {
         let [vertex, fragment] = Self::rows(kind);
         let state = GraphicsState {
             depth: (kind == FieldKind::Radiance).then_some(vk::Format::D32_SFLOAT),
-            // A cube face is a mirror image, which turns every triangle over, so FRONT removes the object's back faces.
-            cull: if model.closed { vk::CullModeFlags::FRONT } else { vk::CullModeFlags::NONE },
             ..GraphicsState::plain(color)
         };
         GraphicsPipeline::new(device, "capture", &library.shader(&vertex)?, &library.shader(&fragment)?, state)
@@ -244,6 +241,10 @@ impl Capture {
         vertices.extend(self.model.colors.iter().filter(|_| radiance).map(|colors| (colors, 0)));
         commands.render(&target, |drawing| {
             drawing.bind(pipeline, &vertices, drawn.gathered().unwrap_or(&self.model.indices));
+            if self.model.closed {
+                // A cube face is a mirror image, which turns every triangle over: these are the object's back faces.
+                drawing.cull(vk::CullModeFlags::FRONT);
+            }
             for DrawnFace { eye, face, slot, ranges } in &drawn.faces {
                 let (forward, right, down) = face_axes(*face);
                 let px = self.face_px;

@@ -112,6 +112,14 @@ impl DrawGrid {
         DrawGrid { maker, made: Default::default() }
     }
 
+    /// Makes what grids are drawn with, on all cores.
+    pub fn make(&self) -> Result<()> {
+        let plain = || self.pipeline(None).map(|_| ());
+        let pixels = || self.maker.sharp.as_ref().map_or(Ok(()), |sharp| self.pipeline(Some(sharp)).map(|_| ()));
+        let (plain, pixels) = rayon::join(plain, pixels);
+        plain.and(pixels)
+    }
+
     pub fn make_those_of(&self, other: &DrawGrid) -> Result<()> {
         for (made, sharp) in other.made.iter().zip([None, self.maker.sharp.as_ref()]) {
             if made.get().is_some() {

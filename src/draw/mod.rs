@@ -20,7 +20,7 @@ use crate::asset::picture::srgb_from_linear;
 use crate::draw::grid::{DrawGrid, DrawnGrid};
 use crate::draw::pixel_light::{ByPixel, PixelLight};
 use crate::draw::smooth::Smooth;
-use crate::draw::triangles::{Detail, DrawTriangles, DrawnTriangles};
+use crate::draw::triangles::{Detail, DrawTriangles, DrawnSurface, DrawnTriangles};
 use crate::error::Result;
 use crate::gloss::DrawnReflections;
 use crate::gpu::{
@@ -268,6 +268,14 @@ impl Draw {
                 .then(|| Smooth::new(device, library, shape, display))
                 .transpose()?,
         })
+    }
+
+    /// Makes the pipelines of these surfaces, and of grids if there are `grids`, on all cores: one may take a second to
+    /// compile. Others are made where they are first drawn with.
+    pub fn make(&self, surfaces: &[DrawnSurface], grids: bool) -> Result<()> {
+        let grid = || if grids { self.grid.make() } else { Ok(()) };
+        let (triangles, grid) = rayon::join(|| self.triangles.make(surfaces), grid);
+        triangles.and(grid)
     }
 
     /// Makes the pipelines that another of the same scene has drawn with, so that shaders that fail do so now.

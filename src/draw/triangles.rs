@@ -16,6 +16,7 @@ use crate::sharp::SharpPermutation;
 use ash::vk;
 use bytemuck::{Pod, Zeroable};
 use glam::{Vec2, Vec3};
+use rayon::prelude::*;
 use std::ops::Range;
 use std::sync::{Arc, OnceLock};
 
@@ -138,8 +139,17 @@ pub enum Look<'p> {
     Glossy { highlights: Option<&'p SharpPermutation>, detail: Detail },
 }
 
+/// What decides which pipelines draw a surface of triangles.
+#[derive(Clone, Copy, PartialEq, Eq, Hash)]
+pub struct DrawnSurface {
+    pub painted: bool,
+    /// Of a glossy one.
+    pub detail: Option<Detail>,
+    pub transparent: bool,
+}
+
 /// What the pixels of a glossy surface look up.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Detail {
     /// Nothing: its vertices reflect.
     Rough,
@@ -192,12 +202,16 @@ impl Form {
     const ALL: [Form; 4] = [Form::Vertices, Form::OverDepth, Form::Over, Form::Pixels];
 }
 
+fn culled(entity: &DrawnEntity<'_>) -> vk::CullModeFlags {
+    if entity.culls { vk::CullModeFlags::BACK } else { vk::CullModeFlags::NONE }
+}
+
 pub struct DrawTriangles {
     maker: PipelineMaker,
     /// How the sharp lights are evaluated that glossy surfaces have highlights of.
     highlights: Option<SharpPermutation>,
-    /// By look, form, and whether backs of triangles are culled; each is made where it is first drawn with.
-    made: [[[OnceLock<GraphicsPipeline>; 2]; Form::ALL.len()]; Look::COUNT],
+    /// By look and form; each is made where it is first drawn with.
+    made: [[OnceLock<GraphicsPipeline>; Form::ALL.len()]; Look::COUNT],
 }
 
 impl DrawTriangles {
@@ -205,24 +219,37 @@ impl DrawTriangles {
         DrawTriangles { maker, highlights, made: Default::default() }
     }
 
+    /// Makes what surfaces are drawn with, on all cores.
+    pub fn make(&self, surfaces: &[DrawnSurface]) -> Result<()> {
+        let forms = |surface: &DrawnSurface| match surface.transparent {
+            true => vec![Form::OverDepth, Form::Over],
+            false if self.maker.sharp.is_some() => vec![Form::Vertices, Form::Pixels],
+            false => vec![Form::Vertices],
+        };
+        let made = |surface: &DrawnSurface| forms(surface).into_iter().map(|form| (*surface, form)).collect::<Vec<_>>();
+        let pipelines: Vec<_> = surfaces.iter().flat_map(made).collect();
+        pipelines.into_par_iter().try_for_each(|(surface, form)| {
+            self.pipeline(self.look_of(surface.painted, surface.detail), form).map(|_| ())
+        })
+    }
+
     pub fn make_those_of(&self, other: &DrawTriangles) -> Result<()> {
         let highlights = self.highlights.as_ref();
         let glossy =
             [Detail::Rough, Detail::Mirror, Detail::Textured].map(|detail| Look::Glossy { highlights, detail });
         for look in [Look::Plain, Look::Painted].into_iter().chain(glossy) {
-            for (form, culls) in Form::ALL.into_iter().flat_map(|form| [(form, false), (form, true)]) {
-                if other.made[look.number()][form as usize][usize::from(culls)].get().is_some() {
-                    self.pipeline(look, form, culls)?;
+            for form in Form::ALL {
+                if other.made[look.number()][form as usize].get().is_some() {
+                    self.pipeline(look, form)?;
                 }
             }
         }
         Ok(())
     }
 
-    fn pipeline(&self, look: Look<'_>, form: Form, culls: bool) -> Result<&GraphicsPipeline> {
+    fn pipeline(&self, look: Look<'_>, form: Form) -> Result<&GraphicsPipeline> {
         let PipelineMaker { state, display, sharp, .. } = &self.maker;
-        let cull = if culls { vk::CullModeFlags::BACK } else { vk::CullModeFlags::NONE };
-        made_once(&self.made[look.number()][form as usize][usize::from(culls)], || {
+        made_once(&self.made[look.number()][form as usize], || {
             let keeps = match form {
                 Form::Vertices => state.keeps,
                 Form::OverDepth => Keeps::Depth,
@@ -230,12 +257,12 @@ impl DrawTriangles {
                 Form::Pixels => {
                     let sharp = sharp.as_ref().expect("pixels evaluate lights where a scene has sharp ones");
                     let rows = Self::patch_rows(*display, state.samples, look, sharp);
-                    let nearer = GraphicsState { cull, nearer_steps: NEARER_STEPS, ..*state };
+                    let nearer = GraphicsState { nearer_steps: NEARER_STEPS, ..*state };
                     return self.maker.make("draw triangle pixels", &rows, nearer);
                 }
             };
             let rows = Self::rows(*display, state.samples, look, form != Form::Vertices);
-            self.maker.make("draw", &rows, GraphicsState { cull, keeps, ..*state })
+            self.maker.make("draw", &rows, GraphicsState { keeps, ..*state })
         })
     }
 
@@ -245,14 +272,19 @@ impl DrawTriangles {
         entity: &DrawnEntity<'d>,
         viewport: &DrawnViewport<'d>,
     ) -> (Look<'_>, Option<DrawnPaint<'d>>, Option<DrawnReflections<'d>>) {
-        match (viewport.gloss.zip(entity.gloss.as_ref()), entity.paint) {
-            (Some((gloss, drawn)), paint) => {
-                let white = DrawnPaint { texture: &gloss.reflections.white, tint: Vec3::ONE, alpha_cutoff: 0.0 };
-                let look = Look::Glossy { highlights: self.highlights.as_ref(), detail: drawn.detail };
-                (look, Some(paint.unwrap_or(white)), Some(gloss))
-            }
-            (None, Some(paint)) => (Look::Painted, Some(paint), None),
-            (None, None) => (Look::Plain, None, None),
+        let Some((gloss, drawn)) = viewport.gloss.zip(entity.gloss.as_ref()) else {
+            return (self.look_of(entity.paint.is_some(), None), entity.paint, None);
+        };
+        let white = DrawnPaint { texture: &gloss.reflections.white, tint: Vec3::ONE, alpha_cutoff: 0.0 };
+        let paint = Some(entity.paint.unwrap_or(white));
+        (self.look_of(true, Some(drawn.detail)), paint, Some(gloss))
+    }
+
+    fn look_of(&self, painted: bool, detail: Option<Detail>) -> Look<'_> {
+        match detail {
+            Some(detail) => Look::Glossy { highlights: self.highlights.as_ref(), detail },
+            None if painted => Look::Painted,
+            None => Look::Plain,
         }
     }
 
@@ -307,8 +339,8 @@ impl DrawTriangles {
             true => Form::Over,
             false => Form::Vertices,
         };
-        let pipeline = self.pipeline(look, form, entity.culls)?;
-        drawing.bind(pipeline, &vertices, &mesh.indices);
+        drawing.bind(self.pipeline(look, form)?, &vertices, &mesh.indices);
+        drawing.cull(culled(entity));
         let push = EntityPush::new(entity, white);
         match paint {
             None => drawing.push(&push),
@@ -347,8 +379,8 @@ impl DrawTriangles {
     ) -> Result<()> {
         let Some(by_pixel) = entity.by_pixel.filter(|_| self.maker.sharp.is_some()) else { return Ok(()) };
         let (look, paint, gloss) = self.look(entity, viewport);
-        let pipeline = self.pipeline(look, Form::Pixels, entity.culls)?;
-        drawing.bind(pipeline, &[], &mesh.indices);
+        drawing.bind(self.pipeline(look, Form::Pixels)?, &[], &mesh.indices);
+        drawing.cull(culled(entity));
         let mut binds = light.binds(
             &[(&mesh.indices, vk::Format::R32_UINT), (viewport.radiosity, QUAD_FORMAT)],
             &[

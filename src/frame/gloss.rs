@@ -83,6 +83,16 @@ impl ShownLights {
     }
 }
 
+/// What the pixels of a glossy entity look up.
+pub(super) fn detail(entity: &Entity) -> Option<Detail> {
+    let gloss = entity.reflection()?;
+    Some(match gloss.roughness {
+        _ if entity.maps.any() => Detail::Textured,
+        roughness if roughness < PIXEL_ROUGHNESS => Detail::Mirror,
+        _ => Detail::Rough,
+    })
+}
+
 impl Frame {
     /// The glossy entities as the scene's camera sees them.
     pub(super) fn prepare_gloss(&mut self, placements: &[Placement]) -> Result<()> {
@@ -122,12 +132,7 @@ impl Frame {
 
     /// How the pixels of an entity reflect.
     pub(super) fn drawn_gloss(&self, entity: &Entity) -> Option<DrawnGloss<'_>> {
-        let gloss = entity.reflection()?;
-        let detail = match gloss.roughness {
-            _ if entity.maps.any() => Detail::Textured,
-            roughness if roughness < PIXEL_ROUGHNESS => Detail::Mirror,
-            _ => Detail::Rough,
-        };
+        let detail = detail(entity)?;
         let MapIndices { gloss, normal, glow } = entity.maps;
         let texture = |index: Option<usize>| index.map(|index| &*self.buffers.textures[index]);
         Some(DrawnGloss { detail, maps: [gloss, normal, glow].map(texture) })

@@ -28,6 +28,7 @@ use crate::bake::ensure::SceneProgress;
 use crate::bake::surfaces::SurfacePlan;
 use crate::bake::{self, Baker, SceneNeeds};
 use crate::bounce::{Bounce, BounceWork, Bounces, Linked, LinkedEntity};
+use crate::draw::triangles::DrawnSurface;
 use crate::draw::{PictureLights, Shading};
 use crate::error::Result;
 use crate::gloss::Reflections;
@@ -38,7 +39,7 @@ use crate::merge::calibrate;
 use crate::merge::variant::{MergePermutation, Reads, Variant, uniform_entities};
 use crate::merge::{Merge, MergeInputs, Readable};
 use crate::scene::groups::Groups;
-use crate::scene::{LightMethod, Lights, Placement, Scene, light};
+use crate::scene::{Entity, LightMethod, Lights, Placement, Scene, light};
 use crate::scene_buffers::{SceneBuffers, limits};
 use crate::shaders::Library;
 use crate::sharp::{self, Sharp, SharpPermutation};
@@ -48,6 +49,7 @@ use pixel::PixelChains;
 use prepare::ClusterWork;
 use radiosity::RadiosityBuffers;
 use sky::SkyLight;
+use std::collections::HashSet;
 use std::ops::Range;
 use std::sync::Arc;
 
@@ -67,6 +69,18 @@ fn methods(scene: &Scene, lights: Lights) -> Vec<LightMethod> {
 /// Largest albedo of each entity, of any colour.
 fn albedos(scene: &Scene) -> Vec<f32> {
     scene.entities.iter().map(|entity| entity.albedo.max_element()).collect()
+}
+
+/// What the receivers of a scene are drawn with.
+fn surfaces_of(scene: &Scene, buffers: &SceneBuffers, reflects: bool) -> Vec<DrawnSurface> {
+    let entities = scene.entities.iter().enumerate();
+    let triangles = entities.filter(|(index, _)| buffers.surface(*index).drawn.grid().is_none());
+    let of = |(index, entity): (usize, &Entity)| DrawnSurface {
+        painted: scene.paint(index).is_some(),
+        detail: gloss::detail(entity).filter(|_| reflects),
+        transparent: entity.transparent,
+    };
+    triangles.map(of).collect::<HashSet<_>>().into_iter().collect()
 }
 
 /// A scene on a device, ready to be lit and drawn at any time.
@@ -136,8 +150,8 @@ impl Frame {
             wanted.variant.reads == Reads::Texels,
         )?;
         let wanted = MergePermutation { gloss: reflections.is_some(), ..wanted };
-        let merge = Merge::new(device, library, usable(device, &buffers, entity_count, wanted))?;
-        let sharp = permutation::sharp(&options, &merge.permutation, &methods, &scene, &buffers);
+        let permutation = usable(device, &buffers, entity_count, wanted);
+        let sharp = permutation::sharp(&options, &permutation, &methods, &scene, &buffers);
         if sharp.is_some() {
             radiosity.keep_soft()?;
         }
@@ -174,19 +188,24 @@ impl Frame {
             .then(|| links.into_iter().enumerate().map(linked).collect::<Vec<_>>())
             .and_then(|entities| Linked::new(&entities, &rigid));
         let self_cells = buffers.has_self_shadows().then_some(&buffers.self_cells);
-        let permutation = merge.permutation;
-        let mut bounce = linked
-            .map(|linked| Bounce::new(device, library, linked, sharp.is_some(), permutation, self_cells))
-            .transpose()?;
+        let soft = sharp.is_some();
+        let sharp = sharp.map(|fitting| SharpPermutation { edges: pixels.is_some(), ..fitting });
+        let picture = FramePicture::new(device, library, &options, PictureLights { pixels, highlights: sharp })?;
+        let has_grids = (0..entity_count).any(|entity| buffers.surface(entity).drawn.grid().is_some());
+        // Shaders take long to compile, so that this is done on all cores.
+        let drawn = || picture.draw.make(&surfaces_of(&scene, &buffers, reflections.is_some()), has_grids);
+        let merging = || Merge::new(device, library, permutation);
+        let lighting = || sharp.map(|permutation| Sharp::new(device, library, permutation)).transpose();
+        let bouncing = || linked.map(|linked| Bounce::new(device, library, linked, soft, permutation, self_cells));
+        let (drawn, (merge, (sharp, bounce))) =
+            rayon::join(drawn, || rayon::join(merging, || rayon::join(lighting, bouncing)));
+        drawn?;
+        let mut bounce = bounce.transpose()?;
         if let Some(bounce) = &mut bounce {
             bounce.set_albedos(&albedos(&scene))?;
             radiosity.keep_direct()?;
         }
-        let edges = pixels.is_some();
-        let sharp =
-            sharp.map(|fitting| Sharp::new(device, library, SharpPermutation { edges, ..fitting })).transpose()?;
-        let lights = PictureLights { pixels, highlights: sharp.as_ref().map(|sharp| sharp.permutation) };
-        let entity_room = entity_count.max(merge.permutation.entity_limit as usize);
+        let entity_room = entity_count.max(permutation.entity_limit as usize);
         let mut sky = SkyLight::new(device, options.bake.bands)?;
         sky.write(&scene, options.bake.bands)?;
         Ok(Frame {
@@ -196,13 +215,13 @@ impl Frame {
             groups: needs.groups,
             surfaces: needs.surfaces,
             methods,
-            sharp,
+            sharp: sharp?,
             options,
-            merge,
+            merge: merge?,
             work: ClusterWork::new(device, lists, entity_room)?,
             sky,
             radiosity,
-            picture: FramePicture::new(device, library, &options, lights)?,
+            picture,
             reflections,
             pixels,
             chains: None,

@@ -99,7 +99,8 @@ pub struct Drawing<'c, 'r> {
 }
 
 impl<'r> Drawing<'_, 'r> {
-    /// Selects the pipeline and its vertex buffers, in order of location, and the index buffer (32-bit).
+    /// Selects the pipeline and its vertex buffers, in order of location, and the index buffer (32-bit). Both sides of
+    /// triangles are drawn, until [`Drawing::cull`].
     ///
     /// # Panics
     /// When the number of vertex buffers differs from the number of shader inputs.
@@ -116,12 +117,19 @@ impl<'r> Drawing<'_, 'r> {
         // SAFETY: everything is borrowed until the commands have run.
         unsafe {
             handle.cmd_bind_pipeline(buffer, vk::PipelineBindPoint::GRAPHICS, pipeline.raw());
+            handle.cmd_set_cull_mode(buffer, vk::CullModeFlags::NONE);
             for (input, (vertex, offset)) in pipeline.inputs.iter().zip(vertices) {
                 handle.cmd_bind_vertex_buffers(buffer, input.location, &[vertex.raw()], &[*offset]);
             }
             handle.cmd_bind_index_buffer(buffer, indices.raw(), 0, vk::IndexType::UINT32);
         }
         self.pipeline = Some(pipeline);
+    }
+
+    /// Leaves out these faces in the draws that follow.
+    pub fn cull(&mut self, faces: vk::CullModeFlags) {
+        // SAFETY: the pipelines of [`GraphicsPipeline`] take it from the commands.
+        unsafe { self.commands.recording.device.handle.cmd_set_cull_mode(self.commands.recording.buffer, faces) };
     }
 
     /// Draws one triangle that covers the area, with a pipeline whose vertex shader makes it from `gl_VertexIndex`;
@@ -139,6 +147,7 @@ impl<'r> Drawing<'_, 'r> {
         // buffer.
         unsafe {
             handle.cmd_bind_pipeline(buffer, vk::PipelineBindPoint::GRAPHICS, pipeline.raw());
+            handle.cmd_set_cull_mode(buffer, vk::CullModeFlags::NONE);
             handle.cmd_draw(buffer, 3, 1, 0, 0);
         }
         Ok(())

@@ -172,7 +172,7 @@ pub enum Keeps {
 }
 
 /// Fixed-function state that differs between graphics pipelines. All have filled triangles, counter-clockwise
-/// front faces, and dynamic viewport and scissor.
+/// front faces, and dynamic viewport, scissor and culling.
 #[derive(Clone, Copy, Debug)]
 pub struct GraphicsState {
     /// Colour attachment format.
@@ -181,8 +181,6 @@ pub struct GraphicsState {
     pub depth: Option<vk::Format>,
     /// Samples per pixel.
     pub samples: u32,
-    /// Faces that are not drawn.
-    pub cull: vk::CullModeFlags,
     /// Which value a pixel keeps of those that are drawn there.
     pub keeps: Keeps,
     /// How much nearer everything is drawn than it is, in steps of the largest depth of its triangle.
@@ -192,8 +190,7 @@ pub struct GraphicsState {
 impl GraphicsState {
     /// One sample of that format without depth: all triangles are drawn, and the last one stays.
     pub fn plain(color: vk::Format) -> Self {
-        let cull = vk::CullModeFlags::NONE;
-        GraphicsState { color, depth: None, samples: 1, cull, keeps: Keeps::Last, nearer_steps: 0.0 }
+        GraphicsState { color, depth: None, samples: 1, keeps: Keeps::Last, nearer_steps: 0.0 }
     }
 }
 
@@ -234,7 +231,6 @@ impl GraphicsPipeline {
         let viewport = vk::PipelineViewportStateCreateInfo::default().viewport_count(1).scissor_count(1);
         let raster = vk::PipelineRasterizationStateCreateInfo::default()
             .polygon_mode(vk::PolygonMode::FILL)
-            .cull_mode(state.cull)
             .front_face(vk::FrontFace::COUNTER_CLOCKWISE)
             .depth_bias_enable(state.nearer_steps != 0.0)
             .depth_bias_constant_factor(state.nearer_steps)
@@ -250,7 +246,7 @@ impl GraphicsPipeline {
             });
         let blend_attachments = [color_blend(state.keeps)];
         let blend = vk::PipelineColorBlendStateCreateInfo::default().attachments(&blend_attachments);
-        let dynamic_states = [vk::DynamicState::VIEWPORT, vk::DynamicState::SCISSOR];
+        let dynamic_states = [vk::DynamicState::VIEWPORT, vk::DynamicState::SCISSOR, vk::DynamicState::CULL_MODE];
         let dynamic = vk::PipelineDynamicStateCreateInfo::default().dynamic_states(&dynamic_states);
         let colors = [state.color];
         let mut rendering = vk::PipelineRenderingCreateInfo::default()

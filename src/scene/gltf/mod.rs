@@ -57,7 +57,7 @@ use crate::scene::{ENTITY_LIMIT, MESH_LIMIT, Maps, Surroundings, check_counts};
 use animation::Tracks;
 use document::Document;
 #[cfg(feature = "cli")]
-pub(crate) use document::FILE_LIMIT_BYTES;
+pub(super) use document::{FILE_LIMIT_BYTES, split};
 use lamp::Lamps;
 pub use notes::Notes;
 use pose::Pose;

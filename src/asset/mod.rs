@@ -29,7 +29,6 @@ mod panel;
 mod peak;
 pub mod picture;
 pub mod pierce;
-mod radiance;
 pub mod sky;
 mod teapot;
 pub mod texture;

@@ -1,6 +1,7 @@
 //! Numbers of a scene file, checked while they are read, so that a message names the line of the number.
 
 use crate::asset::environment::RADIANCE_LIMIT;
+pub(super) use crate::asset::environment::one;
 use crate::asset::short;
 use glam::Vec3;
 use serde::de::{Deserialize, Deserializer, Error};
@@ -70,11 +71,6 @@ pub fn period<'de, D: Deserializer<'de>>(source: D) -> Result<f64, D::Error> {
     } else {
         Err(D::Error::custom(format!("a period of {} s is too short", short(value))))
     }
-}
-
-/// Default of scales.
-pub(super) fn one() -> f32 {
-    1.0
 }
 
 /// Whether a value may be left out of a file, where its default stands for it.

@@ -4,7 +4,6 @@
 //! object has one owner whose `Drop` destroys it; every owner keeps the [`Device`] alive.
 
 pub mod access;
-mod bind;
 pub mod census;
 pub mod commands;
 pub mod compiling;
@@ -37,8 +36,8 @@ pub mod validation;
 pub mod window;
 
 pub use access::Access;
-pub use bind::Bind;
 pub use commands::Commands;
+pub use descriptors::Bind;
 pub use device::{Device, DeviceOptions};
 pub use drawing::{Drawing, Target};
 pub use flight::{FLIGHTS, Flight, Timing};

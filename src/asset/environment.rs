@@ -1,7 +1,7 @@
 //! Distant light: radiance that depends on direction only, evaluated and projected to spherical harmonics. Its small
 //! bright discs are kept apart.
 
-use std::f64::consts::PI;
+use std::f64::consts::{PI, TAU};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -10,8 +10,6 @@ use serde::{Deserialize, Serialize};
 
 use super::disc::{Disc, Sun};
 use super::equirect::Equirect;
-pub use super::radiance::RADIANCE_LIMIT;
-use super::radiance::{key_zonal, one};
 use super::short;
 use super::sky::{Dome, Sky};
 use crate::error::{Error, Result};
@@ -19,6 +17,10 @@ use crate::sh::basis::Y00;
 use crate::sh::lobe;
 use crate::sh::rotation::Rotation;
 
+/// Largest radiance, and largest of its factors. Its square still fits f32.
+pub const RADIANCE_LIMIT: f32 = 1e15;
+/// Intervals of Simpson's rule for the lobe of [`key_zonal`]; its relative error is then below 1e-11.
+const LOBE_INTERVALS: usize = 1 << 14;
 /// Largest angle by which the light may be turned: f32 still resolves hundredths of a degree there.
 const TURN_LIMIT_DEG: f32 = 1e5;
 
@@ -66,6 +68,11 @@ impl Default for EnvironmentData {
             sun: None,
         }
     }
+}
+
+/// Default of factors in scene files.
+pub(crate) fn one() -> f32 {
+    1.0
 }
 
 fn is_one(value: &f32) -> bool {
@@ -136,10 +143,10 @@ impl EnvironmentData {
     }
 
     /// [`EnvironmentData::within`] for the mean of a picture.
-    fn check_picture(&self, picture: &Equirect) -> Result<()> {
-        let scale = self.image.as_ref().map_or(0.0, |image| f64::from(image.scale));
+    fn check_picture(&self, picture: Option<&Arc<Equirect>>) -> Result<()> {
+        let Some((picture, image)) = picture.zip(self.image.as_ref()) else { return Ok(()) };
         let mean = picture.coefficients(1).iter().map(|c| c[0]).fold(0.0, f64::max) / (4.0 * PI).sqrt();
-        self.within("image", mean * scale)
+        self.within("image", mean * f64::from(image.scale))
     }
 
     /// Whether no part is given.
@@ -219,7 +226,7 @@ impl Environment {
             Equirect::decode(&read(&image.file)?).map(Arc::new).map_err(|e| e.context(image.file.display()))
         });
         let picture = picture.transpose()?;
-        picture.as_ref().map_or(Ok(()), |picture| source.check_picture(picture))?;
+        source.check_picture(picture.as_ref())?;
         let dome = source.sky.as_ref().map(|sky| Arc::new(Dome::new(sky)));
         Ok(Self { source: source.clone(), picture, dome })
     }
@@ -232,7 +239,7 @@ impl Environment {
             return Err(Error::Input(format!("environment image {} was not read", other.display())));
         }
         let picture = self.picture.clone().filter(|_| source.image.is_some());
-        picture.as_ref().map_or(Ok(()), |picture| source.check_picture(picture))?;
+        source.check_picture(picture.as_ref())?;
         let dome = match &source.sky {
             same if *same == self.source.sky => self.dome.clone(),
             sky => sky.as_ref().map(|sky| Arc::new(Dome::new(sky))),
@@ -350,4 +357,33 @@ impl Environment {
         }
         sum
     }
+}
+
+/// z_l = sqrt((2l + 1) / (4 pi)) * 2 pi * integral over c of exp(sharpness * (c - 1)) P_l(c), by Simpson's rule in 1 -
+/// c over the part where the exponential exceeds 1e-17.
+fn key_zonal(bands: usize, sharpness: f64) -> Vec<f64> {
+    let end = if sharpness > 20.0 { 40.0 / sharpness } else { 2.0 };
+    let step = end / LOBE_INTERVALS as f64;
+    let mut z = vec![0.0; bands];
+    for i in 0..=LOBE_INTERVALS {
+        let weight = if i == 0 || i == LOBE_INTERVALS {
+            1.0
+        } else if i % 2 == 1 {
+            4.0
+        } else {
+            2.0
+        };
+        let below = step * i as f64;
+        let value = weight * step / 3.0 * (-sharpness * below).exp();
+        let c = 1.0 - below;
+        let mut previous = 0.0;
+        let mut legendre = 1.0;
+        for (l, sum) in z.iter_mut().enumerate() {
+            *sum += value * legendre;
+            let degree = l as f64;
+            (previous, legendre) =
+                (legendre, ((2.0 * degree + 1.0) * c * legendre - degree * previous) / (degree + 1.0));
+        }
+    }
+    z.iter().enumerate().map(|(l, sum)| ((2.0 * l as f64 + 1.0) / (4.0 * PI)).sqrt() * TAU * sum).collect()
 }

@@ -1,14 +1,15 @@
-//! Generated meshes with analytic normals, for the built-in scenes and the tests.
-//!
-//! The functions assert their ranges and are the crate's own. [`Generator`](super::Generator) is their public form; it
-//! reports bad numbers as errors.
+//! Generated meshes with analytic normals: as scene files name them, and for numbers that are in range.
 
 use std::collections::HashMap;
 use std::f64::consts::TAU;
 
-use super::mesh::Mesh;
-use super::teapot;
 use glam::{DVec3, Vec3};
+use serde::{Deserialize, Serialize};
+
+use super::mesh::{COORDINATE_LIMIT_M, Mesh, TRIANGLE_LIMIT};
+use super::panel;
+pub use super::teapot::teapot;
+use crate::error::{Error, Result};
 
 /// Largest number of times that an icosahedron's triangles are divided: 1.3 million triangles.
 pub const SPHERE_SUBDIVISION_LIMIT: u32 = 8;
@@ -18,6 +19,131 @@ pub const COOL: Vec3 = Vec3::new(0.02, 0.12, 1.0);
 pub const WARM: Vec3 = Vec3::new(1.0, 0.12, 0.02);
 /// Half the width of the blend between the two colours, as a share of the major radius. It spans several segments.
 const BLEND: f64 = 0.15;
+/// Most that lengths of one mesh may differ by, so that f32 positions still keep its vertices apart.
+const LENGTH_RATIO: f32 = 1e6;
+
+/// A generated mesh as a scene file names it: a table with one key, for example `sphere = { radius_m = 0.5,
+/// subdivisions = 3 }`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case", deny_unknown_fields)]
+pub enum Generator {
+    /// A square in y = 0 around the origin with normal +y, edges along x and z.
+    Plane {
+        /// Edge length in metres.
+        size_m: f32,
+        /// Squares along an edge.
+        cells: u32,
+    },
+    /// A closed sphere around the origin: an icosahedron whose triangles are divided, every vertex on the sphere.
+    Sphere {
+        /// Radius in metres.
+        radius_m: f32,
+        /// Number of times that every triangle is divided into four, at most [`SPHERE_SUBDIVISION_LIMIT`].
+        subdivisions: u32,
+    },
+    /// A closed ring around the y axis, every vertex on the torus.
+    Torus {
+        /// Radius in metres of the circle in the middle of the ring.
+        major_m: f32,
+        /// Radius in metres of the ring's cross-section.
+        minor_m: f32,
+        /// Pieces around the axis.
+        segments: u32,
+        /// Pieces around the cross-section.
+        sides: u32,
+    },
+    /// The same with the emission pattern [`WARM`] where x > 0 and [`COOL`] where x < 0, with a narrow smooth blend.
+    TorusTwoColour {
+        /// Radius in metres of the circle in the middle of the ring.
+        major_m: f32,
+        /// Radius in metres of the ring's cross-section.
+        minor_m: f32,
+        /// Pieces around the axis.
+        segments: u32,
+        /// Pieces around the cross-section.
+        sides: u32,
+    },
+    /// A closed box around the origin; normals are split at the edges, positions agree.
+    Cuboid {
+        /// Edge lengths in metres along x, y and z.
+        size_m: Vec3,
+        /// Squares along every edge.
+        cells: u32,
+    },
+    /// A lamp around the origin that shines towards +y.
+    Disc {
+        /// Radius in metres.
+        radius_m: f32,
+    },
+    /// A lamp around the origin that shines towards +y.
+    Rectangle {
+        /// Edge lengths in metres along x and z.
+        size_m: [f32; 2],
+    },
+    /// Martin Newell's teapot: y up, base on y = 0, spout towards +x, 6.5 m from handle to spout and 2.4 m high. It is
+    /// not closed.
+    Teapot {
+        /// Squares along an edge of each of the 32 patches.
+        subdivisions: u32,
+    },
+}
+
+impl Generator {
+    /// Checks the numbers and makes the mesh.
+    ///
+    /// # Errors
+    /// [`Error::Input`], one line, where a length is not positive and finite or a count is zero or makes too many
+    /// triangles.
+    pub fn build(&self) -> Result<Mesh> {
+        use Generator::{Cuboid, Disc, Plane, Rectangle, Sphere, Teapot, Torus, TorusTwoColour};
+        let square = |n: u32| u64::from(n).pow(2);
+        let (lengths, counts, triangles) = match *self {
+            Plane { size_m, cells } => (vec![size_m], vec![cells], square(cells).saturating_mul(2)),
+            Sphere { radius_m, subdivisions } => {
+                if subdivisions > SPHERE_SUBDIVISION_LIMIT {
+                    return Err(Error::Input(format!("subdivisions are over the limit of {SPHERE_SUBDIVISION_LIMIT}")));
+                }
+                (vec![radius_m], vec![], 0)
+            }
+            Torus { major_m, minor_m, segments, sides } | TorusTwoColour { major_m, minor_m, segments, sides } => {
+                if segments < 3 || sides < 3 {
+                    return Err(Error::Input("a torus needs at least 3 segments and 3 sides".into()));
+                }
+                if minor_m > major_m {
+                    return Err(Error::Input("the minor radius of a torus is at most its major radius".into()));
+                }
+                (vec![major_m, minor_m], vec![], (u64::from(segments) * u64::from(sides)).saturating_mul(2))
+            }
+            Cuboid { size_m, cells } => (size_m.to_array().to_vec(), vec![cells], square(cells).saturating_mul(12)),
+            Disc { radius_m } => (vec![radius_m], vec![], 0),
+            Rectangle { size_m } => (size_m.to_vec(), vec![], 0),
+            Teapot { subdivisions } => (vec![], vec![subdivisions], square(subdivisions).saturating_mul(64)),
+        };
+        if lengths.iter().any(|l| !(1e-7..=COORDINATE_LIMIT_M / 2.0).contains(l)) {
+            return Err(Error::Input(format!("a length is not within 1e-7 to {:e} m", COORDINATE_LIMIT_M / 2.0)));
+        }
+        let longest = lengths.iter().copied().fold(0.0, f32::max);
+        if lengths.iter().any(|l| longest > LENGTH_RATIO * l) {
+            return Err(Error::Input(format!("lengths differ by more than a factor of {LENGTH_RATIO:e}")));
+        }
+        if counts.contains(&0) {
+            return Err(Error::Input("a count of cells or subdivisions is zero".into()));
+        }
+        if triangles > TRIANGLE_LIMIT as u64 {
+            return Err(Error::Input(format!("{triangles} triangles are over the limit of {TRIANGLE_LIMIT}")));
+        }
+        Ok(match *self {
+            Plane { size_m, cells } => plane(size_m, cells),
+            Sphere { radius_m, subdivisions } => sphere(radius_m, subdivisions),
+            Torus { major_m, minor_m, segments, sides } => torus(major_m, minor_m, segments, sides),
+            TorusTwoColour { major_m, minor_m, segments, sides } => torus_two_colour(major_m, minor_m, segments, sides),
+            Cuboid { size_m, cells } => cuboid(size_m, cells),
+            Disc { radius_m } => panel::disc(radius_m)?,
+            Rectangle { size_m } => panel::rectangle(size_m)?,
+            Teapot { subdivisions } => teapot(subdivisions),
+        })
+    }
+}
 
 /// Makes the mesh. It meets the conditions of [`Mesh::new`] if the numbers are in range.
 fn finish(
@@ -42,9 +168,8 @@ fn split([a, b, c, d]: [u32; 4]) -> [[u32; 3]; 2] {
     [[a, b, c], [a, c, d]]
 }
 
-/// A square in y = 0 around the origin with normal +y: edges of `size_m` along x and z, (cells + 1)^2 vertices.
+/// [`Generator::Plane`] of (cells + 1)^2 vertices.
 pub fn plane(size_m: f32, cells: u32) -> Mesh {
-    assert!(size_m > 0.0 && cells > 0, "plane: size {size_m}, cells {cells}");
     let row = cells + 1;
     let positions: Vec<Vec3> =
         (0..row * row).map(|i| Vec3::new(along(size_m, i % row, cells), 0.0, along(size_m, i / row, cells))).collect();
@@ -58,10 +183,8 @@ pub fn plane(size_m: f32, cells: u32) -> Mesh {
     finish("plane", positions, vec![Vec3::Y; (row * row) as usize], None, triangles)
 }
 
-/// A closed sphere around the origin: an icosahedron whose triangles are cut in four `subdivisions` times (at most
-/// [`SPHERE_SUBDIVISION_LIMIT`]), every vertex on the sphere. 10 * 4^s + 2 vertices, 20 * 4^s triangles.
+/// [`Generator::Sphere`] of 10 * 4^s + 2 vertices and 20 * 4^s triangles.
 pub fn sphere(radius_m: f32, subdivisions: u32) -> Mesh {
-    assert!(radius_m > 0.0 && subdivisions <= SPHERE_SUBDIVISION_LIMIT, "sphere: radius {radius_m}, {subdivisions}");
     let golden = (1.0 + 5f64.sqrt()) / 2.0;
     // Cyclic turns of (0, +-1, +-golden); the twenty faces are the triples at edge length 2.
     let mut points: Vec<DVec3> = [(1.0, golden), (-1.0, golden), (1.0, -golden), (-1.0, -golden)]
@@ -103,13 +226,12 @@ pub fn sphere(radius_m: f32, subdivisions: u32) -> Mesh {
     finish("sphere", positions, points.iter().map(|p| p.as_vec3()).collect(), None, triangles)
 }
 
-/// A closed ring around the y axis: `major_m` to the middle of its cross-section, which has radius `minor_m` <=
-/// `major_m`. segments * sides vertices, all on the torus.
+/// [`Generator::Torus`] of segments * sides vertices.
 pub fn torus(major_m: f32, minor_m: f32, segments: u32, sides: u32) -> Mesh {
     ring("torus", major_m, minor_m, segments, sides, None)
 }
 
-/// [`torus`] whose emission pattern is [`WARM`] where x > 0 and [`COOL`] where x < 0, with a narrow smooth blend.
+/// [`Generator::TorusTwoColour`].
 pub fn torus_two_colour(major_m: f32, minor_m: f32, segments: u32, sides: u32) -> Mesh {
     let color = |p: Vec3| {
         let t = ((f64::from(p.x) / (f64::from(major_m) * BLEND) + 1.0) * 0.5).clamp(0.0, 1.0);
@@ -126,10 +248,6 @@ fn ring(
     sides: u32,
     color: Option<&dyn Fn(Vec3) -> Vec3>,
 ) -> Mesh {
-    assert!(
-        minor_m > 0.0 && minor_m <= major_m && segments > 2 && sides > 2,
-        "{name}: {major_m} {minor_m} {segments} {sides}"
-    );
     let vertex = |i: u32| {
         let around = TAU * f64::from(i / sides) / f64::from(segments);
         let across = TAU * f64::from(i % sides) / f64::from(sides);
@@ -150,10 +268,8 @@ fn ring(
     finish(name, positions, normals, colors, triangles)
 }
 
-/// A closed box around the origin with `cells` squares along every edge; normals are split at the edges, positions
-/// agree.
+/// [`Generator::Cuboid`].
 pub fn cuboid(size_m: Vec3, cells: u32) -> Mesh {
-    assert!(size_m.min_element() > 0.0 && cells > 0, "cuboid: size {size_m}, cells {cells}");
     let mut positions = Vec::new();
     let mut normals = Vec::new();
     let mut triangles = Vec::new();
@@ -186,7 +302,8 @@ pub fn cuboid(size_m: Vec3, cells: u32) -> Mesh {
     finish("cuboid", positions, normals, None, triangles)
 }
 
-/// The meshes of `assets/meshes`: what [`super::embedded`] offers and `scripts/meshes` writes.
+/// The meshes of `assets/meshes`: what [`super::embedded`] offers and `scripts/meshes` writes. The teapot has about 6 000
+/// triangles.
 pub fn library() -> Vec<Mesh> {
     vec![
         plane(6.0, 32),
@@ -194,6 +311,6 @@ pub fn library() -> Vec<Mesh> {
         torus(0.5, 0.2, 48, 24),
         torus_two_colour(0.5, 0.15, 48, 20),
         cuboid(Vec3::ONE, 6),
-        teapot::teapot(teapot::DEFAULT_SUBDIVISIONS),
+        teapot(10),
     ]
 }

@@ -18,25 +18,23 @@ pub mod environment;
 pub mod equirect;
 #[cfg(feature = "cli")]
 pub mod false_color;
-pub(crate) mod generate;
-pub mod generator;
+pub mod generate;
 pub mod grid;
 #[cfg(feature = "cli")]
 pub mod lettering;
 pub mod mesh;
 pub mod obj;
 mod outline;
-pub(crate) mod panel;
+mod panel;
 mod peak;
 pub mod picture;
 pub mod pierce;
-mod radiance;
 pub mod sky;
-pub(crate) mod teapot;
+mod teapot;
 pub mod texture;
 pub mod topology;
 
-pub use generator::Generator;
+pub use generate::Generator;
 pub use mesh::Mesh;
 
 /// Fails where the content of a file is larger than what is read; `what` says what it is.

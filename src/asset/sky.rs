@@ -11,7 +11,7 @@ use glam::{DMat3, DVec3, Vec3};
 use serde::{Deserialize, Serialize};
 
 use super::disc::{Disc, SUN_DEG, check_angle};
-use super::radiance::{RADIANCE_LIMIT, one};
+use super::environment::RADIANCE_LIMIT;
 use super::short;
 use crate::error::{Error, Result};
 use crate::sh::basis::{self, MAX_BANDS, MAX_COEFFICIENTS};
@@ -52,7 +52,7 @@ impl Default for Sky {
             sun_azimuth_deg: 50.0,
             turbidity: 3.0,
             radiance: 0.35,
-            sun: one(),
+            sun: 1.0,
             sun_angle_deg: SUN_DEG,
             ground: Vec3::splat(0.2),
         }

@@ -8,8 +8,6 @@ use super::mesh::Mesh;
 
 /// The control points; source and credit stand in its header and in `assets/CREDITS.md`.
 const CONTROL_TEXT: &str = include_str!("../../assets/newell_teapot.txt");
-/// Squares along a patch edge that give about 6 000 triangles.
-pub const DEFAULT_SUBDIVISIONS: u32 = 10;
 /// Heights are divided by this, as in renderings of the teapot since Blinn.
 const VERTICAL_SQUEEZE: f64 = 1.3;
 /// Vertices of neighbouring patches closer than this, in units of the table, are one position.
@@ -27,7 +25,6 @@ type Patch = [[DVec3; 4]; 4];
 /// patch edge collapses to a point, the limit of the normal is taken and triangles without area are dropped. The mesh
 /// is not closed: the lid rests on an open pot, and spout and handle reach into it.
 pub fn teapot(subdivisions: u32) -> Mesh {
-    assert!(subdivisions > 0, "teapot: no subdivisions");
     let mut weld = Weld::default();
     let mut triangles = Vec::new();
     for patch in patches() {

@@ -3,7 +3,7 @@
 use std::path::Path;
 use std::process::ExitCode;
 
-use shadow_fields::asset::generator::library;
+use shadow_fields::asset::generate::library;
 use shadow_fields::asset::obj::write_obj;
 
 #[allow(clippy::print_stderr)]

@@ -5,7 +5,7 @@
 //! device uses it.
 
 use super::access::{Access, Tracker};
-use super::bind::Bind;
+use super::descriptors::Bind;
 use super::device::Device;
 use super::flight::{Flight, MAX_PASSES, Recording, Signals, Timing};
 use super::image::Image;
@@ -52,6 +52,11 @@ impl<'r> Commands<'r> {
         })
     }
 
+    /// The device's functions and the command buffer, which is recording.
+    pub(super) fn raw(&self) -> (&ash::Device, vk::CommandBuffer) {
+        (&self.recording.device.handle, self.recording.buffer)
+    }
+
     /// Runs `record` as one labelled, timed pass. On some devices full barriers stand around it, see
     /// [`Commands::separates_passes`].
     ///
@@ -92,15 +97,9 @@ impl<'r> Commands<'r> {
     /// Writes a timestamp when all commands before it have finished.
     fn stamp(&mut self, query: u32) {
         let stage = vk::PipelineStageFlags2::ALL_COMMANDS;
+        let (handle, buffer) = self.raw();
         // SAFETY: the command buffer is recording and the query was reset at its start.
-        unsafe {
-            self.recording.device.handle.cmd_write_timestamp2(
-                self.recording.buffer,
-                stage,
-                self.recording.queries,
-                query,
-            )
-        };
+        unsafe { handle.cmd_write_timestamp2(buffer, stage, self.recording.queries, query) };
         if self.separates_passes() {
             // It orders execution and makes no memory visible. llvmpipe takes a timestamp when it next rasterises or
             // meets a barrier, not at its place among dispatches.
@@ -118,8 +117,9 @@ impl<'r> Commands<'r> {
     fn memory_barrier(&self, barrier: vk::MemoryBarrier2<'_>) {
         let barriers = [barrier];
         let info = vk::DependencyInfo::default().memory_barriers(&barriers);
+        let (handle, buffer) = self.raw();
         // SAFETY: the command buffer is recording and outside a render pass.
-        unsafe { self.recording.device.handle.cmd_pipeline_barrier2(self.recording.buffer, &info) };
+        unsafe { handle.cmd_pipeline_barrier2(buffer, &info) };
     }
 
     pub(super) fn pass_name(&self) -> String {
@@ -168,8 +168,9 @@ impl<'r> Commands<'r> {
             .dst_stage_mask(to.stage())
             .dst_access_mask(to.mask())];
         let info = vk::DependencyInfo::default().image_memory_barriers(&barriers);
+        let (handle, buffer) = self.raw();
         // SAFETY: the command buffer is recording and outside a render pass; the image is borrowed until it has run.
-        unsafe { self.recording.device.handle.cmd_pipeline_barrier2(self.recording.buffer, &info) };
+        unsafe { handle.cmd_pipeline_barrier2(buffer, &info) };
     }
 
     /// Counts a barrier and returns whether a test asked to omit it ([`Device::omit_barrier`]).
@@ -199,11 +200,11 @@ impl<'r> Commands<'r> {
         }
         self.bind(&pipeline.layout, &pipeline.name, vk::PipelineBindPoint::COMPUTE, resources)?;
         self.push(&pipeline.layout, &pipeline.name, push);
+        let (handle, buffer) = self.raw();
         // SAFETY: pipeline and resources are borrowed until the commands have run; limits were checked above.
         unsafe {
-            let handle = &self.recording.device.handle;
-            handle.cmd_bind_pipeline(self.recording.buffer, vk::PipelineBindPoint::COMPUTE, pipeline.raw());
-            handle.cmd_dispatch(self.recording.buffer, groups[0], groups[1], groups[2]);
+            handle.cmd_bind_pipeline(buffer, vk::PipelineBindPoint::COMPUTE, pipeline.raw());
+            handle.cmd_dispatch(buffer, groups[0], groups[1], groups[2]);
         }
         Ok(())
     }
@@ -221,8 +222,9 @@ impl<'r> Commands<'r> {
         self.tracker.use_range(from.id, &from.name, range.clone(), Access::TransferRead, &pass);
         self.copied_into(to, target, &pass);
         let regions = [vk::BufferCopy { src_offset: range.start, dst_offset: offset_bytes, size }];
+        let (handle, buffer) = self.raw();
         // SAFETY: both ranges are in bounds and both buffers are borrowed until the commands have run.
-        unsafe { self.recording.device.handle.cmd_copy_buffer(self.recording.buffer, from.raw(), to.raw(), &regions) };
+        unsafe { handle.cmd_copy_buffer(buffer, from.raw(), to.raw(), &regions) };
     }
 
     /// Notes a copy into `to`. The host reads a readback buffer after the commands have run.
@@ -238,34 +240,26 @@ impl<'r> Commands<'r> {
         let pass = self.pass_name();
         self.tracker.use_image(from.id, &from.name, Access::TransferRead, &pass);
         self.copied_into(to, to.all(), &pass);
+        let layout = Access::TransferRead.layout();
+        let (handle, buffer) = self.raw();
         // SAFETY: both are borrowed until the commands have run; the layout is that of a transfer read (tracked).
-        unsafe {
-            let layout = Access::TransferRead.layout();
-            self.recording.device.handle.cmd_copy_image_to_buffer(
-                self.recording.buffer,
-                from.raw(),
-                layout,
-                to.raw(),
-                &[packed(from)],
-            );
-        }
+        unsafe { handle.cmd_copy_image_to_buffer(buffer, from.raw(), layout, to.raw(), &[packed(from)]) };
     }
 
     /// Copies a buffer into the whole of a single-sampled image; rows are tightly packed.
     pub fn copy_to_image(&mut self, from: &'r Buffer, to: &'r Image) {
+        self.copy_regions(from, to, &[packed(to)]);
+    }
+
+    /// Copies parts of a buffer, which lie within it, into parts of an image.
+    pub(super) fn copy_regions(&mut self, from: &'r Buffer, to: &'r Image, regions: &[vk::BufferImageCopy]) {
         let pass = self.pass_name();
         self.tracker.use_range(from.id, &from.name, from.all(), Access::TransferRead, &pass);
         self.tracker.use_image(to.id, &to.name, Access::TransferWrite, &pass);
+        let layout = Access::TransferWrite.layout();
+        let (handle, buffer) = self.raw();
         // SAFETY: both are borrowed until the commands have run; the layout is that of a transfer write (tracked).
-        unsafe {
-            self.recording.device.handle.cmd_copy_buffer_to_image(
-                self.recording.buffer,
-                from.raw(),
-                to.raw(),
-                Access::TransferWrite.layout(),
-                &[packed(to)],
-            );
-        }
+        unsafe { handle.cmd_copy_buffer_to_image(buffer, from.raw(), to.raw(), layout, regions) };
     }
 
     /// Copies a whole single-sampled image into another image of the same size and format.
@@ -280,17 +274,10 @@ impl<'r> Commands<'r> {
         self.tracker.use_image(to.id, &to.name, Access::TransferWrite, &pass);
         let vk::BufferImageCopy { image_subresource: layers, image_extent, .. } = packed(from);
         let region = vk::ImageCopy::default().src_subresource(layers).dst_subresource(layers).extent(image_extent);
+        let [read, write] = [Access::TransferRead, Access::TransferWrite].map(Access::layout);
+        let (handle, buffer) = self.raw();
         // SAFETY: both are borrowed until the commands have run; the layouts are those of the accesses (tracked).
-        unsafe {
-            self.recording.device.handle.cmd_copy_image(
-                self.recording.buffer,
-                from.raw(),
-                Access::TransferRead.layout(),
-                to.raw(),
-                Access::TransferWrite.layout(),
-                &[region],
-            );
-        }
+        unsafe { handle.cmd_copy_image(buffer, from.raw(), read, to.raw(), write, &[region]) };
     }
 
     /// Ends the recording, submits it and waits. Returns the duration of each pass, in order.

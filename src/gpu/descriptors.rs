@@ -3,15 +3,33 @@
 
 use super::Checked;
 use super::access::Access;
-use super::bind::Bind;
 use super::commands::Commands;
-use super::memory::Buffer;
+use super::image::Image;
+use super::memory::{Buffer, TexelView};
 use super::pipeline::Layout;
 use super::reflect::Binding;
+use super::texture::Texture;
 use crate::error::{Error, Result};
 use ash::vk;
 use bytemuck::Pod;
 use std::ops::Range;
+
+/// A resource given to a pass; its position in the list is its binding number.
+#[derive(Clone)]
+pub enum Bind<'r> {
+    /// A whole buffer, as storage or uniform block.
+    Buffer(&'r Buffer),
+    /// A byte range of a buffer. Its start keeps the device's offset alignment (at most 256 bytes).
+    Range(&'r Buffer, Range<u64>),
+    /// A texel view.
+    Texel(TexelView<'r>),
+    /// An image that is read with `texelFetch`.
+    Image(&'r Image),
+    /// A texture that a fragment shader samples.
+    Texture(&'r Texture),
+    /// No resource: the shader permutation does not have this binding.
+    None,
+}
 
 /// Panics because a resource does not match its binding.
 fn complain(pass: &str, binding: &Binding, what: &str) -> ! {
@@ -32,16 +50,9 @@ impl<'r> Commands<'r> {
         );
         if layout.push_bytes > 0 {
             let bytes = &bytes[..layout.push_bytes as usize];
+            let (handle, buffer) = self.raw();
             // SAFETY: size and stages are the layout's own.
-            unsafe {
-                self.recording.device.handle.cmd_push_constants(
-                    self.recording.buffer,
-                    layout.pipeline,
-                    layout.push_stages,
-                    0,
-                    bytes,
-                );
-            }
+            unsafe { handle.cmd_push_constants(buffer, layout.pipeline, layout.push_stages, 0, bytes) };
         }
     }
 
@@ -109,22 +120,10 @@ impl<'r> Commands<'r> {
             unsafe { self.recording.device.handle.update_descriptor_sets(&[write], &[]) };
             let _ = (buffers, views, images);
         }
-        self.bind_set(layout, point, set);
-        Ok(())
-    }
-
-    fn bind_set(&self, layout: &Layout, point: vk::PipelineBindPoint, set: vk::DescriptorSet) {
+        let (handle, buffer) = self.raw();
         // SAFETY: the command buffer is recording and the set matches the layout.
-        unsafe {
-            self.recording.device.handle.cmd_bind_descriptor_sets(
-                self.recording.buffer,
-                point,
-                layout.pipeline,
-                0,
-                &[set],
-                &[],
-            );
-        }
+        unsafe { handle.cmd_bind_descriptor_sets(buffer, point, layout.pipeline, 0, &[set], &[]) };
+        Ok(())
     }
 
     /// The buffer and byte range of a block's resource, checked against the block and the device's limits.

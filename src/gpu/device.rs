@@ -1,9 +1,9 @@
 //! Logical device and queue: the root that every other Vulkan object keeps alive.
 
-use super::Checked;
 use super::instance::{Instance, OwnInstance};
 use super::select::{Candidate, choose, physical_devices, queue_family};
 use super::validation::Validation;
+use super::{Checked, pipeline_cache};
 use crate::error::Result;
 use ash::vk;
 use std::ffi::{CStr, CString};
@@ -53,6 +53,7 @@ pub struct Device {
     pub(super) memory: vk::PhysicalDeviceMemoryProperties,
     pub(super) names: Option<ash::ext::debug_utils::Device>,
     pub(super) pipeline_cache: vk::PipelineCache,
+    pub(super) pipeline_key: String,
     /// Limits of the physical device.
     pub limits: vk::PhysicalDeviceLimits,
     /// Name, driver and kind of the physical device.
@@ -147,6 +148,7 @@ impl Device {
             memory,
             names,
             pipeline_cache: vk::PipelineCache::null(),
+            pipeline_key: pipeline_cache::key(&properties),
             limits: properties.limits,
             info,
             cache_dir,
@@ -154,7 +156,7 @@ impl Device {
             omitted_barrier: AtomicUsize::new(usize::MAX),
             instance: instance.clone(),
         };
-        device.pipeline_cache = device.load_pipeline_cache(&properties)?;
+        device.pipeline_cache = device.load_pipeline_cache()?;
         Ok(Arc::new(device))
     }
 

@@ -1,9 +1,8 @@
 //! Render passes: what they draw into, and what is drawn.
 
 use super::access::Access;
-use super::bind::Bind;
 use super::commands::Commands;
-use super::flight::Recording;
+use super::descriptors::Bind;
 use super::image::Image;
 use super::memory::Buffer;
 use super::pipeline::GraphicsPipeline;
@@ -83,11 +82,13 @@ impl<'r> Commands<'r> {
         if let Some(depth) = &depth {
             info = info.depth_attachment(depth);
         }
+        let (handle, buffer) = self.raw();
         // SAFETY: the attachments are borrowed until the commands have run and in the layouts stated (tracked).
-        unsafe { self.recording.device.handle.cmd_begin_rendering(self.recording.buffer, &info) };
+        unsafe { handle.cmd_begin_rendering(buffer, &info) };
         let outcome = record(&mut Drawing { commands: self, pipeline: None });
+        let (handle, buffer) = self.raw();
         // SAFETY: begun above.
-        unsafe { self.recording.device.handle.cmd_end_rendering(self.recording.buffer) };
+        unsafe { handle.cmd_end_rendering(buffer) };
         outcome
     }
 }
@@ -112,8 +113,7 @@ impl<'r> Drawing<'_, 'r> {
             tracker.use_range(buffer.id, &buffer.name, *offset..buffer.size_bytes, Access::VertexRead, &pass);
         }
         tracker.use_range(indices.id, &indices.name, indices.all(), Access::VertexRead, &pass);
-        let handle = &self.commands.recording.device.handle;
-        let buffer = self.commands.recording.buffer;
+        let (handle, buffer) = self.commands.raw();
         // SAFETY: everything is borrowed until the commands have run.
         unsafe {
             handle.cmd_bind_pipeline(buffer, vk::PipelineBindPoint::GRAPHICS, pipeline.raw());
@@ -141,8 +141,7 @@ impl<'r> Drawing<'_, 'r> {
         assert!(pipeline.inputs.is_empty(), "{}: makes its own vertices", pipeline.name);
         self.commands.bind(&pipeline.layout, &pipeline.name, vk::PipelineBindPoint::GRAPHICS, resources)?;
         self.commands.push(&pipeline.layout, &pipeline.name, push);
-        let handle = &self.commands.recording.device.handle;
-        let buffer = self.commands.recording.buffer;
+        let (handle, buffer) = self.commands.raw();
         // SAFETY: pipeline and resources are borrowed until the commands are submitted; the vertex shader reads no
         // buffer.
         unsafe {
@@ -175,18 +174,15 @@ impl<'r> Drawing<'_, 'r> {
         let query = recording.passes.len() as u32 - 1;
         assert!(!recording.counted.contains(&query), "{}: a pass counts once", recording.name);
         recording.counted.push(query);
+        let samples = recording.samples;
+        let (handle, buffer) = self.commands.raw();
         // SAFETY: for both calls, the command buffer is recording inside a render pass, and the query was reset before
         // it.
-        unsafe {
-            let Recording { device, buffer, samples, .. } = &self.commands.recording;
-            device.handle.cmd_begin_query(*buffer, *samples, query, vk::QueryControlFlags::PRECISE);
-        }
+        unsafe { handle.cmd_begin_query(buffer, samples, query, vk::QueryControlFlags::PRECISE) };
         let outcome = record(self);
+        let (handle, buffer) = self.commands.raw();
         // SAFETY: begun above.
-        unsafe {
-            let Recording { device, buffer, samples, .. } = &self.commands.recording;
-            device.handle.cmd_end_query(*buffer, *samples, query);
-        }
+        unsafe { handle.cmd_end_query(buffer, samples, query) };
         outcome
     }
 
@@ -200,9 +196,9 @@ impl<'r> Drawing<'_, 'r> {
             min_depth: 0.0,
             max_depth: 1.0,
         };
-        let handle = &self.commands.recording.device.handle;
+        let (handle, buffer) = self.commands.raw();
         // SAFETY: the command buffer is recording.
-        unsafe { handle.cmd_set_viewport(self.commands.recording.buffer, 0, &[viewport]) };
+        unsafe { handle.cmd_set_viewport(buffer, 0, &[viewport]) };
         self.clip([x, y, width, height]);
     }
 
@@ -212,9 +208,9 @@ impl<'r> Drawing<'_, 'r> {
             offset: vk::Offset2D { x: x.cast_signed(), y: y.cast_signed() },
             extent: vk::Extent2D { width, height },
         };
-        let handle = &self.commands.recording.device.handle;
+        let (handle, buffer) = self.commands.raw();
         // SAFETY: the command buffer is recording.
-        unsafe { handle.cmd_set_scissor(self.commands.recording.buffer, 0, &[scissor]) };
+        unsafe { handle.cmd_set_scissor(buffer, 0, &[scissor]) };
     }
 
     /// Sets the bound pipeline's push constants.
@@ -233,12 +229,9 @@ impl<'r> Drawing<'_, 'r> {
     /// Before [`Drawing::bind`].
     pub fn corners(&mut self, range: Range<u32>) {
         assert!(self.pipeline.is_some(), "a pipeline is bound before drawing");
+        let (handle, buffer) = self.commands.raw();
         // SAFETY: the pipeline has no vertex inputs, as `bind` checked against the buffers that it was given.
-        unsafe {
-            let count = range.end - range.start;
-            let handle = &self.commands.recording.device.handle;
-            handle.cmd_draw(self.commands.recording.buffer, count, 1, range.start, 0);
-        }
+        unsafe { handle.cmd_draw(buffer, range.end - range.start, 1, range.start, 0) };
     }
 
     /// Draws the triangles of a range of indices, three indices per triangle.
@@ -247,17 +240,8 @@ impl<'r> Drawing<'_, 'r> {
     /// Before [`Drawing::bind`].
     pub fn indexed(&mut self, range: Range<u32>) {
         assert!(self.pipeline.is_some(), "a pipeline is bound before drawing");
+        let (handle, buffer) = self.commands.raw();
         // SAFETY: the index buffer covers the range (its owner made both); values were checked when the mesh was read.
-        unsafe {
-            let count = range.end - range.start;
-            self.commands.recording.device.handle.cmd_draw_indexed(
-                self.commands.recording.buffer,
-                count,
-                1,
-                range.start,
-                0,
-                0,
-            );
-        }
+        unsafe { handle.cmd_draw_indexed(buffer, range.end - range.start, 1, range.start, 0, 0) };
     }
 }

@@ -2,7 +2,7 @@
 
 use super::select::version_text;
 use super::validation::{LAYER, Messages, Validation, on_message};
-use super::{Checked, loader, manifest};
+use super::{Checked, loader};
 use crate::error::{Error, Result};
 use ash::vk;
 use std::ffi::CStr;
@@ -49,7 +49,9 @@ fn check_loader(entry: &ash::Entry, validation: Validation, surface: &[&'static 
     }
     // SAFETY: as above.
     let extensions = match unsafe { entry.enumerate_instance_extension_properties(None) } {
-        Err(vk::Result::ERROR_OUT_OF_HOST_MEMORY) if let Some(broken) = manifest::broken() => return Err(broken),
+        Err(vk::Result::ERROR_OUT_OF_HOST_MEMORY) if let Some(broken) = loader::broken_manifest() => {
+            return Err(broken);
+        }
         other => other.checked("vkEnumerateInstanceExtensionProperties", "instance")?,
     };
     let has = |name: &CStr| extensions.iter().any(|e| e.extension_name_as_c_str() == Ok(name));
@@ -96,8 +98,10 @@ impl Instance {
         // SAFETY: every pointer in `create` outlives the call; the handle is destroyed in `Drop` after its children.
         let handle = match unsafe { entry.create_instance(&create, None) } {
             // The loader returns this code when it finds no driver.
-            Err(vk::Result::ERROR_INCOMPATIBLE_DRIVER) => return Err(manifest::no_driver()),
-            Err(vk::Result::ERROR_OUT_OF_HOST_MEMORY) if let Some(broken) = manifest::broken() => return Err(broken),
+            Err(vk::Result::ERROR_INCOMPATIBLE_DRIVER) => return Err(loader::no_driver()),
+            Err(vk::Result::ERROR_OUT_OF_HOST_MEMORY) if let Some(broken) = loader::broken_manifest() => {
+                return Err(broken);
+            }
             other => other.checked("vkCreateInstance", "instance")?,
         };
         let own = OwnInstance { entry, debug: None, has_debug_utils };

@@ -4,7 +4,6 @@
 //! object has one owner whose `Drop` destroys it; every owner keeps the [`Device`] alive.
 
 pub mod access;
-mod bind;
 pub mod census;
 pub mod commands;
 pub mod compiling;
@@ -19,10 +18,9 @@ pub mod image;
 mod instance;
 mod limits;
 pub mod loader;
-mod manifest;
 pub mod memory;
 pub mod pipeline;
-pub mod pipeline_cache;
+mod pipeline_cache;
 #[cfg(feature = "view")]
 pub mod present;
 pub mod reflect;
@@ -31,25 +29,23 @@ pub mod shader;
 pub mod share;
 pub mod signals;
 pub mod texture;
-pub mod upload;
 pub mod validation;
 #[cfg(feature = "view")]
 pub mod window;
 
 pub use access::Access;
-pub use bind::Bind;
 pub use commands::Commands;
+pub use descriptors::Bind;
 pub use device::{Device, DeviceOptions};
 pub use drawing::{Drawing, Target};
 pub use flight::{FLIGHTS, Flight, Timing};
 pub use image::{Image, ImageShape};
-pub use memory::{Buffer, BufferKind, TexelView};
+pub use memory::{Buffer, BufferKind, TexelView, Upload};
 pub use pipeline::{ComputePipeline, GraphicsPipeline, GraphicsState, Keeps};
 pub use select::{cores, share_cores};
 pub use shader::{Shader, Stage};
 pub use share::Gpu;
 pub use texture::Texture;
-pub use upload::Upload;
 pub use validation::Validation;
 
 #[cfg(feature = "view")]

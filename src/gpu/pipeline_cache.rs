@@ -13,9 +13,9 @@ impl Device {
     }
 
     /// A pipeline cache that begins with what is on disk.
-    pub(super) fn load_pipeline_cache(&self, properties: &vk::PhysicalDeviceProperties) -> Result<vk::PipelineCache> {
+    pub(super) fn load_pipeline_cache(&self) -> Result<vk::PipelineCache> {
         let file = self.pipeline_cache_path().and_then(|path| crate::files::read(&path).ok()).unwrap_or_default();
-        let data = trusted(&file, properties).unwrap_or_default();
+        let data = unsealed(&self.pipeline_key, &file).unwrap_or_default();
         if data.is_empty() && !file.is_empty() {
             log::info!("the pipeline cache on disk is damaged or belongs to another driver, and is replaced");
         }
@@ -29,52 +29,14 @@ impl Device {
         let Some(path) = self.pipeline_cache_path() else { return };
         // SAFETY: the cache is alive.
         let Ok(data) = (unsafe { self.handle.get_pipeline_cache_data(self.pipeline_cache) }) else { return };
-        if let Err(error) = crate::files::replace(&path, &sealed("", &data)) {
+        if let Err(error) = crate::files::replace(&path, &sealed(&self.pipeline_key, &data)) {
             log::warn!("{}: the pipeline cache was not saved: {error}", path.display());
         }
     }
 }
 
-/// The data of a file; `None` if it was not sealed, or if it does not start with a version-one header of this very
-/// device (Vulkan specification, "Pipeline Cache Header").
-pub fn trusted<'f>(file: &'f [u8], properties: &vk::PhysicalDeviceProperties) -> Option<&'f [u8]> {
-    let data = unsealed("", file)?;
-    let word = |at: usize| data.get(at..at + 4).map(|b| u32::from_le_bytes(b.try_into().expect("four bytes")));
-    let one = vk::PipelineCacheHeaderVersion::ONE.as_raw() as u32;
-    let fits = word(0).is_some_and(|length| length >= 32 && length as usize <= data.len())
-        && word(4) == Some(one)
-        && word(8) == Some(properties.vendor_id)
-        && word(12) == Some(properties.device_id)
-        && data.get(16..32) == Some(&properties.pipeline_cache_uuid[..]);
-    fits.then_some(data)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn foreign_and_damaged_pipeline_caches_are_refused() {
-        let mut properties = vk::PhysicalDeviceProperties { vendor_id: 7, device_id: 9, ..Default::default() };
-        properties.pipeline_cache_uuid[3] = 5;
-        let mut data = Vec::new();
-        for word in [32_u32, 1, 7, 9] {
-            data.extend(word.to_le_bytes());
-        }
-        data.extend(properties.pipeline_cache_uuid);
-        data.extend([1, 2, 3]);
-        assert_eq!(trusted(&sealed("", &data), &properties), Some(&data[..]));
-        for at in [0, 4, 8, 12, 19] {
-            let mut foreign = data.clone();
-            foreign[at] ^= 0x40;
-            assert!(trusted(&sealed("", &foreign), &properties).is_none(), "byte {at}");
-        }
-        for at in [0, 31, 32, 66] {
-            let mut damaged = sealed("", &data);
-            damaged[at] ^= 0x40;
-            assert!(trusted(&damaged, &properties).is_none(), "byte {at}");
-        }
-        assert!(trusted(&sealed("", &data[..31]), &properties).is_none());
-        assert!(trusted(&data, &properties).is_none() && trusted(&[], &properties).is_none());
-    }
+/// What a device and its driver tell of the pipelines that they can read.
+pub(super) fn key(properties: &vk::PhysicalDeviceProperties) -> String {
+    let vk::PhysicalDeviceProperties { vendor_id, device_id, pipeline_cache_uuid, .. } = properties;
+    format!("{vendor_id:08x}{device_id:08x}{:032x}", u128::from_be_bytes(*pipeline_cache_uuid))
 }

@@ -68,12 +68,24 @@ impl Texture {
         Ok(texture)
     }
 
+    /// Copies the levels and leaves the image ready to be sampled.
     fn fill(&self, device: &Arc<Device>, name: &str, levels: &[Level<'_>]) -> Result<()> {
         let bytes: Vec<u8> = levels.iter().flat_map(|level| level.bytes).copied().collect();
         let mut staging = Buffer::new(device, name, BufferKind::Upload, bytes.len() as u64)?;
         staging.write(0, &bytes);
+        let mut offset = 0;
+        let mut regions = Vec::with_capacity(levels.len());
+        for (number, level) in levels.iter().enumerate() {
+            let extent = vk::Extent3D { width: level.width, height: level.height, depth: 1 };
+            let mut region = packed(&self.image).buffer_offset(offset).image_extent(extent);
+            region.image_subresource.mip_level = number as u32;
+            regions.push(region);
+            offset += level.bytes.len() as u64;
+        }
         let mut commands = Commands::new(device, name)?;
-        commands.fill_texture(&staging, &self.image, levels);
+        commands.image_barrier(&self.image, None, Access::TransferWrite);
+        commands.copy_regions(&staging, &self.image, &regions);
+        commands.image_barrier(&self.image, Some(Access::TransferWrite), Access::GraphicsSampled);
         commands.submit().map(|_| ())
     }
 
@@ -84,36 +96,5 @@ impl Texture {
             image_view: self.image.view(),
             image_layout: Access::GraphicsSampled.layout(),
         }
-    }
-}
-
-impl<'r> Commands<'r> {
-    /// Copies the levels, which stand one after the other in `from`, and leaves the image ready to be sampled.
-    fn fill_texture(&mut self, from: &'r Buffer, to: &'r Image, levels: &[Level<'_>]) {
-        let pass = self.pass_name();
-        self.tracker.use_range(from.id, &from.name, from.all(), Access::TransferRead, &pass);
-        let mut offset = 0;
-        let mut regions = Vec::with_capacity(levels.len());
-        for (number, level) in levels.iter().enumerate() {
-            let extent = vk::Extent3D { width: level.width, height: level.height, depth: 1 };
-            let mut region = packed(to).buffer_offset(offset).image_extent(extent);
-            region.image_subresource.mip_level = number as u32;
-            regions.push(region);
-            offset += level.bytes.len() as u64;
-        }
-        self.image_barrier(to, None, Access::TransferWrite);
-        self.tracker.use_image(to.id, &to.name, Access::TransferWrite, &pass);
-        // SAFETY: the command buffer is recording and outside a render pass; both are borrowed until it has run, and the
-        // regions lie within the staging buffer, which was made for them.
-        unsafe {
-            self.recording.device.handle.cmd_copy_buffer_to_image(
-                self.recording.buffer,
-                from.raw(),
-                to.raw(),
-                Access::TransferWrite.layout(),
-                &regions,
-            );
-        }
-        self.image_barrier(to, Some(Access::TransferWrite), Access::GraphicsSampled);
     }
 }

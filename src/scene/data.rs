@@ -228,7 +228,7 @@ pub struct TextureData {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub image: Option<usize>,
     /// How it goes on beyond its edges along u and v: `"repeat"`, which is the default, `"mirror"` or `"clamp"`.
-    #[serde(default, skip_serializing_if = "repeats")]
+    #[serde(default, skip_serializing_if = "values::is_default")]
     pub wrap: [Wrap; 2],
     /// Linear, 0 to 1. The default is 1.
     #[serde(default = "white", deserialize_with = "values::albedo")]
@@ -271,10 +271,6 @@ impl TextureData {
         }
         Ok(())
     }
-}
-
-fn repeats(wrap: &[Wrap; 2]) -> bool {
-    *wrap == [Wrap::Repeat; 2]
 }
 
 fn white() -> Vec3 {
@@ -369,7 +365,7 @@ impl MeshData {
     }
 }
 
-// Written by hand, because serde's flattening would accept unknown keys.
+// Written by hand, because serde's flattening of the generator would accept unknown keys.
 impl<'de> Deserialize<'de> for MeshData {
     fn deserialize<D: serde::Deserializer<'de>>(source: D) -> std::result::Result<Self, D::Error> {
         use serde::de::Error as _;
@@ -381,13 +377,10 @@ impl<'de> Deserialize<'de> for MeshData {
             piece: Option<u32>,
             bend: Option<[f64; 9]>,
             pose: Option<PoseData>,
+            #[serde(flatten)]
+            rest: toml::Table,
         }
-        let table = toml::Table::deserialize(source)?;
-        let (keys, rest): (toml::Table, toml::Table) = table
-            .into_iter()
-            .partition(|(key, _)| ["name", "file", "part", "piece", "bend", "pose"].contains(&key.as_str()));
-        let Keys { name, file, part, piece, bend, pose } =
-            Keys::deserialize(toml::Value::Table(keys)).map_err(|e| D::Error::custom(e.message()))?;
+        let Keys { name, file, part, piece, bend, pose, rest } = Keys::deserialize(source)?;
         let fail = |what: &str| Err(D::Error::custom(format!("mesh {name:?} {what}")));
         if file.is_some() != rest.is_empty() {
             return fail("has either a file or one generator");
@@ -440,7 +433,7 @@ pub struct EntityData {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub gloss: Option<Gloss>,
     /// Textures of a glossy surface besides its albedo.
-    #[serde(default, skip_serializing_if = "Maps::is_empty")]
+    #[serde(default, skip_serializing_if = "values::is_default")]
     pub maps: Maps,
     /// Share of light that does not pass, 0 to 1, and a factor on the albedo: less than 1 for glass and for what is
     /// blended with what lies behind it. The default is 1.

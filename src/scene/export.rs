@@ -11,10 +11,14 @@ impl Data {
     /// Makes the names of files, which are relative to the folder `from`, relative to `to`. Files of built-in scenes keep
     /// their built-in names.
     pub fn move_files(&mut self, from: &Path, to: &Path) {
+        self.files_mut().for_each(|file| *file = found_from(to, from, file));
+    }
+
+    /// All names of files.
+    pub(super) fn files_mut(&mut self) -> impl Iterator<Item = &mut PathBuf> {
         let meshes = self.meshes.iter_mut().filter_map(|mesh| mesh.file.as_mut());
         let textures = self.textures.iter_mut().filter_map(|texture| texture.file.as_mut());
-        let image = self.environment.image.iter_mut().map(|image| &mut image.file);
-        meshes.chain(textures).chain(image).for_each(|file| *file = found_from(to, from, file));
+        meshes.chain(textures).chain(self.environment.image.as_mut().map(|image| &mut image.file))
     }
 
     /// Writes the scene as a file with the comment `head` (without `#`) in its first line.

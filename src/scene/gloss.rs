@@ -46,10 +46,6 @@ pub struct Maps {
 }
 
 impl Maps {
-    pub(crate) fn is_empty(&self) -> bool {
-        *self == Self::default()
-    }
-
     /// The names.
     pub(crate) fn names(&self) -> impl Iterator<Item = &String> {
         self.gloss.iter().chain(&self.normal).chain(&self.glow)

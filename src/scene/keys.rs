@@ -1,10 +1,9 @@
 //! Keys of one property over time: of a position, a rotation or a scale, each with times of its own.
 
 use glam::{DQuat, DVec4, Vec3};
-use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 
-use super::values::{NUMBER_LIMIT, POSITION_LIMIT_M, SCALE_LIMIT};
+use super::values::{self, NUMBER_LIMIT, POSITION_LIMIT_M, SCALE_LIMIT};
 
 /// Values between two keys.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -17,12 +16,6 @@ pub enum Between {
     Linear,
     /// A Hermite cubic with the slopes that the keys have on either side; rotations are brought to unit length.
     Cubic,
-}
-
-impl Between {
-    fn is_linear(&self) -> bool {
-        *self == Between::Linear
-    }
 }
 
 /// A property that keys give.
@@ -107,81 +100,67 @@ impl KeyValue for [f32; 1] {
 
 /// The values of a property at times; before the first and after the last it is constant.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(try_from = "Written<V>", bound(deserialize = "V: KeyValue + DeserializeOwned"))]
+#[serde(deny_unknown_fields)]
 pub struct Keys<V> {
     /// Seconds, at least one, increasing.
-    times_s: Vec<f64>,
-    /// One a time.
-    values: Vec<V>,
-    #[serde(skip_serializing_if = "Between::is_linear")]
-    interpolation: Between,
-    /// With cubic keys: change a second when the key is reached, one a time.
-    #[serde(skip_serializing_if = "Vec::is_empty")]
-    in_slopes: Vec<V>,
-    /// With cubic keys: change a second when the key is left, one a time.
-    #[serde(skip_serializing_if = "Vec::is_empty")]
-    out_slopes: Vec<V>,
-    /// Seconds after which time 0 comes again.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    period_s: Option<f64>,
-}
-
-/// [`Keys`] before they are checked.
-#[derive(Clone, Debug, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Written<V> {
-    /// Seconds.
     pub times_s: Vec<f64>,
     /// One a time.
     pub values: Vec<V>,
     /// Values between two keys; linear where it is left out.
-    #[serde(default)]
+    #[serde(default, skip_serializing_if = "values::is_default")]
     pub interpolation: Between,
-    /// Change a second when a key is reached: with cubic keys one a time, else none.
-    #[serde(default = "Vec::new")]
+    /// With cubic keys: change a second when the key is reached, one a time.
+    #[serde(default = "Vec::new", skip_serializing_if = "Vec::is_empty")]
     pub in_slopes: Vec<V>,
-    /// Change a second when a key is left.
-    #[serde(default = "Vec::new")]
+    /// With cubic keys: change a second when the key is left, one a time.
+    #[serde(default = "Vec::new", skip_serializing_if = "Vec::is_empty")]
     pub out_slopes: Vec<V>,
     /// Seconds after which time 0 comes again.
-    #[serde(default)]
+    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub period_s: Option<f64>,
 }
 
-impl<V: KeyValue> TryFrom<Written<V>> for Keys<V> {
-    type Error = String;
+/// Reads keys and checks them.
+pub(super) fn checked<'de, D, V>(source: D) -> Result<Option<Keys<V>>, D::Error>
+where
+    D: serde::Deserializer<'de>,
+    V: KeyValue + Deserialize<'de>,
+{
+    let keys = Keys::deserialize(source)?;
+    keys.check().map_err(serde::de::Error::custom)?;
+    Ok(Some(keys))
+}
 
-    fn try_from(written: Written<V>) -> Result<Self, String> {
-        let Written { times_s, values, interpolation, in_slopes, out_slopes, period_s } = written;
+impl<V: KeyValue> Keys<V> {
+    /// Refuses what [`Keys::at`] cannot read, and values out of range.
+    pub(super) fn check(&self) -> Result<(), String> {
+        let Keys { times_s, values, interpolation, in_slopes, out_slopes, period_s } = self;
         if times_s.is_empty() || values.len() != times_s.len() {
             return Err(format!("keys need one value a time and at least one: {} for {}", values.len(), times_s.len()));
         }
         if let Some(bad) = times_s.iter().find(|time| time.is_nan() || time.abs() > NUMBER_LIMIT) {
             return Err(format!("the time {bad} s of a key is not finite or beyond 1e9"));
         }
-        if let Some(before) = times_s.windows(2).position(|pair| pair[1] <= pair[0]) {
-            let [earlier, later] = [times_s[before], times_s[before + 1]];
+        if let Some([earlier, later]) = times_s.array_windows().find(|[earlier, later]| later <= earlier) {
             return Err(format!("keys need times that increase: {later} s stands after {earlier} s"));
         }
         if let Some(bad) = values.iter().position(|value| !value.is_usable()) {
             return Err(format!("key {} of {} is not {}", bad + 1, values.len(), V::WHAT));
         }
-        let slopes = if interpolation == Between::Cubic { times_s.len() } else { 0 };
+        let slopes = if *interpolation == Between::Cubic { times_s.len() } else { 0 };
         if in_slopes.len() != slopes || out_slopes.len() != slopes {
             return Err("cubic keys, and no others, have one value of in_slopes and one of out_slopes a time".into());
         }
         let is_moderate = |slope: &V| slope.raw().to_array().iter().all(|x| x.abs() <= NUMBER_LIMIT);
-        if !in_slopes.iter().chain(&out_slopes).all(is_moderate) {
+        if !in_slopes.iter().chain(out_slopes).all(is_moderate) {
             return Err("a slope of cubic keys is not finite or beyond 1e9".into());
         }
         if let Some(bad) = period_s.filter(|period| !(1e-6..=NUMBER_LIMIT).contains(period)) {
             return Err(format!("period_s {bad} is not within 1e-6 to 1e9"));
         }
-        Ok(Keys { times_s, values, interpolation, in_slopes, out_slopes, period_s })
+        Ok(())
     }
-}
 
-impl<V: KeyValue> Keys<V> {
     /// The value at `time_s` seconds, in as many numbers as it has. Cubic keys may leave its range.
     pub fn at(&self, time_s: f64) -> DVec4 {
         let time_s = self.period_s.map_or(time_s, |period| time_s.rem_euclid(period));
@@ -200,11 +179,6 @@ impl<V: KeyValue> Keys<V> {
                 hermite([from, to], slopes.map(|slope| slope * span_s), share)
             }
         }
-    }
-
-    /// How many keys there are.
-    pub fn count(&self) -> usize {
-        self.times_s.len()
     }
 }
 

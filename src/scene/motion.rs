@@ -5,7 +5,7 @@ use std::f64::consts::TAU;
 use glam::{DQuat, DVec3, DVec4, Quat, Vec3};
 use serde::{Deserialize, Serialize};
 
-use super::keys::{Keys, hermite};
+use super::keys::{self, Keys, hermite};
 use super::values;
 
 /// Object to world: scale, then rotation, then position.
@@ -121,7 +121,7 @@ pub enum Motion {
         #[serde(default)]
         repeat: bool,
         /// Interpolation between keys.
-        #[serde(default, skip_serializing_if = "Interpolation::is_linear")]
+        #[serde(default, skip_serializing_if = "values::is_default")]
         interpolation: Interpolation,
     },
     /// Moves the position around a line; the rotation does not change.
@@ -178,13 +178,13 @@ pub struct Node {
     #[serde(default = "values::one", deserialize_with = "values::scale")]
     pub scale: f32,
     /// Keys of the position in metres.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[serde(default, skip_serializing_if = "Option::is_none", deserialize_with = "keys::checked")]
     pub position_keys: Option<Keys<Vec3>>,
     /// Keys of the rotation: quaternions x, y, z, w.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[serde(default, skip_serializing_if = "Option::is_none", deserialize_with = "keys::checked")]
     pub rotation_keys: Option<Keys<[f32; 4]>>,
     /// Keys of the scale.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[serde(default, skip_serializing_if = "Option::is_none", deserialize_with = "keys::checked")]
     pub scale_keys: Option<Keys<f32>>,
 }
 
@@ -197,9 +197,9 @@ impl Node {
 
     /// How many keys it has.
     pub fn key_count(&self) -> usize {
-        self.position_keys.as_ref().map_or(0, Keys::count)
-            + self.rotation_keys.as_ref().map_or(0, Keys::count)
-            + self.scale_keys.as_ref().map_or(0, Keys::count)
+        self.position_keys.as_ref().map_or(0, |keys| keys.times_s.len())
+            + self.rotation_keys.as_ref().map_or(0, |keys| keys.times_s.len())
+            + self.scale_keys.as_ref().map_or(0, |keys| keys.times_s.len())
     }
 
     /// Where it stands at `time_s` seconds. Cubic keys that leave the range of a scene file end at its limits.
@@ -234,12 +234,6 @@ pub enum Interpolation {
     /// unless the motion repeats and its last key equals its first. The spline may overshoot the keys; scales stay
     /// above a tenth of their keys' scales.
     Smooth,
-}
-
-impl Interpolation {
-    fn is_linear(&self) -> bool {
-        *self == Interpolation::Linear
-    }
 }
 
 fn up() -> Vec3 {

@@ -1,9 +1,10 @@
 //! Numbers of a scene file, checked while they are read, so that a message names the line of the number.
 
 use crate::asset::environment::RADIANCE_LIMIT;
+pub(super) use crate::asset::environment::one;
 use crate::asset::short;
 use glam::Vec3;
-use serde::de::{Deserialize, Deserializer, Error, SeqAccess, Visitor};
+use serde::de::{Deserialize, Deserializer, Error};
 
 /// Largest magnitude of a coordinate in metres.
 pub const POSITION_LIMIT_M: f32 = 1e7;
@@ -72,37 +73,21 @@ pub fn period<'de, D: Deserializer<'de>>(source: D) -> Result<f64, D::Error> {
     }
 }
 
-/// Default of scales.
-pub(super) fn one() -> f32 {
-    1.0
+/// Whether a value may be left out of a file, where its default stands for it.
+pub(super) fn is_default<T: Default + PartialEq>(value: &T) -> bool {
+    *value == T::default()
 }
-
-const SCALE: &str = "one scale, uniform and positive (1e-7 to 1e7)";
 
 /// One factor for all axes.
 pub fn scale<'de, D: Deserializer<'de>>(source: D) -> Result<f32, D::Error> {
-    struct ScaleVisitor;
-    impl<'de> Visitor<'de> for ScaleVisitor {
-        type Value = f32;
-        fn expecting(&self, f: &mut std::fmt::Formatter) -> std::fmt::Result {
-            f.write_str(SCALE)
-        }
-        fn visit_f64<E: Error>(self, value: f64) -> Result<f32, E> {
-            let single = value as f32;
-            if (1.0 / SCALE_LIMIT..=SCALE_LIMIT).contains(&single) {
-                Ok(single)
-            } else {
-                Err(E::custom(format!("scale {}: expected {SCALE}", short(value))))
-            }
-        }
-        fn visit_i64<E: Error>(self, value: i64) -> Result<f32, E> {
-            self.visit_f64(value as f64)
-        }
-        fn visit_seq<A: SeqAccess<'de>>(self, _: A) -> Result<f32, A::Error> {
-            Err(A::Error::custom(format!("a list of scales: expected {SCALE}")))
-        }
+    const EXPECTED: &str = "expected one scale, uniform and positive (1e-7 to 1e7)";
+    let value = f64::deserialize(source).map_err(|_| D::Error::custom(EXPECTED))?;
+    let single = value as f32;
+    if (1.0 / SCALE_LIMIT..=SCALE_LIMIT).contains(&single) {
+        Ok(single)
+    } else {
+        Err(D::Error::custom(format!("scale {}: {EXPECTED}", short(value))))
     }
-    source.deserialize_any(ScaleVisitor)
 }
 
 /// A scale that may be left out.

@@ -4,9 +4,9 @@
 //! With SHADOW_FIELDS_REQUIRE_DEVICE=1 a missing device, validation layer or tool fails the tests; without it they are
 //! skipped with a line on stderr.
 
-#![allow(dead_code)] // every test binary uses its own part
+#![allow(dead_code, unused_imports)] // every test binary uses its own part
 
-pub mod generate;
+pub use shadow_fields::asset::generate;
 
 use bytemuck::Pod;
 use glam::Vec3;

@@ -6,7 +6,7 @@ use shadow_fields::asset::disc::Sun;
 use shadow_fields::asset::environment::{EnvironmentData, EnvironmentImage, Gradient, KeyLight};
 use shadow_fields::asset::sky::Sky;
 use shadow_fields::asset::{Generator, Mesh, obj, picture};
-use shadow_fields::scene::keys::{Keys, Written};
+use shadow_fields::scene::keys::Keys;
 use shadow_fields::scene::motion::{Interpolation, Keyframe, Node, RotationData};
 use shadow_fields::scene::{Camera, EntityData, Motion, Output, Scene, SceneBuilder};
 use std::path::Path;
@@ -109,21 +109,21 @@ impl Draw {
                 position: self.vector(),
                 rotation: self.rotation(),
                 scale: self.float(),
-                position_keys: self.keys().and_then(|written| Keys::try_from(written).ok()),
+                position_keys: self.maybe(Self::keys),
                 rotation_keys: None,
                 scale_keys: None,
             })),
         }
     }
 
-    fn keys(&mut self) -> Option<Written<Vec3>> {
+    fn keys(&mut self) -> Keys<Vec3> {
         let list = |draw: &mut Self| (0..draw.0.u32(..4)).map(|_| draw.vector()).collect::<Vec<_>>();
         let values = list(self);
         let in_slopes = list(self);
         let out_slopes = list(self);
         let times_s = (0..self.0.u32(..4)).map(|_| self.double()).collect();
         let period_s = self.maybe(Self::double);
-        Some(Written { times_s, values, interpolation: Default::default(), in_slopes, out_slopes, period_s })
+        Keys { times_s, values, interpolation: Default::default(), in_slopes, out_slopes, period_s }
     }
 
     fn keyframe(&mut self) -> Keyframe {

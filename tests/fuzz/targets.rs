@@ -7,7 +7,7 @@ use shadow_fields::asset::equirect::Equirect;
 use shadow_fields::asset::{Mesh, embedded, picture};
 use shadow_fields::error::Error;
 use shadow_fields::field::Lattice;
-use shadow_fields::gpu::{pipeline_cache, shader};
+use shadow_fields::gpu::shader;
 use shadow_fields::merge::calibrate::Calibration;
 use shadow_fields::scene::{Scene, gltf};
 use shadow_fields::{Result, app};
@@ -59,7 +59,6 @@ pub const TARGETS: &[Target] = &[
         reads_file: false,
     },
     Target { name: "spirv", seeds: words, tokens: "", parse: spirv, reads_file: false },
-    Target { name: "pipelines", seeds: caches, tokens: "", parse: pipelines, reads_file: false },
     Target {
         name: "calibration",
         seeds: calibrations,
@@ -242,26 +241,6 @@ fn spirv(bytes: &[u8]) -> Result<()> {
         None => Err(Error::Failed("not sealed".into())),
         Some(words) => {
             assert_eq!(bytes, &super::targets::words()[0], "{} words pass that nobody compiled", words.len());
-            Ok(())
-        }
-    }
-}
-
-fn properties() -> ash::vk::PhysicalDeviceProperties {
-    ash::vk::PhysicalDeviceProperties { vendor_id: 7, device_id: 9, ..Default::default() }
-}
-
-fn caches() -> Vec<Vec<u8>> {
-    let mut data = [32_u32, 1, 7, 9].map(u32::to_le_bytes).concat();
-    data.extend([0; 40]);
-    vec![shader::sealed("", &data)]
-}
-
-fn pipelines(bytes: &[u8]) -> Result<()> {
-    match pipeline_cache::trusted(bytes, &properties()) {
-        None => Err(Error::Failed("not sealed".into())),
-        Some(data) => {
-            assert!(bytes == caches()[0], "{} bytes pass that nobody wrote", data.len());
             Ok(())
         }
     }

@@ -5,7 +5,7 @@ use crate::model;
 use glam::{DMat4, DQuat, DVec3, Vec3};
 use model::{Model, load};
 use serde_json::json;
-use shadow_fields::scene::keys::{Between, Keys, Written};
+use shadow_fields::scene::keys::{Between, Keys};
 use shadow_fields::scene::motion::{Motion, Node};
 use shadow_fields::scene::{Data, gltf};
 use std::f32::consts::{FRAC_1_SQRT_2, PI};
@@ -247,7 +247,7 @@ fn motion_of_nodes_survives_a_scene_file() {
 
 #[test]
 fn keys_stay_within_what_a_placement_may_be() {
-    let steep = Written {
+    let keys = Keys {
         times_s: vec![0.0, 1.0],
         values: vec![1.0, 1.0],
         interpolation: Between::Cubic,
@@ -255,7 +255,6 @@ fn keys_stay_within_what_a_placement_may_be() {
         out_slopes: vec![-100.0, 0.0],
         period_s: None,
     };
-    let keys = Keys::try_from(steep).unwrap();
     let node = Node { scale_keys: Some(keys), ..Node::still(Vec3::ZERO, DQuat::IDENTITY, 1.0) };
     let mut entity = shadow_fields::scene::EntityData::of_mesh("a");
     entity.motion = vec![Motion::Node(Box::new(node))];

@@ -3,7 +3,7 @@
 use glam::{DVec3, Vec3};
 use proptest::prelude::*;
 use shadow_fields::scene::EntityData;
-use shadow_fields::scene::keys::{Between, Keys, Written};
+use shadow_fields::scene::keys::{Between, Keys};
 use shadow_fields::scene::motion::{Interpolation, Keyframe, Motion, Node, RotationData};
 use shadow_fields::view::edit;
 
@@ -54,7 +54,7 @@ fn keys() -> impl Strategy<Value = Keys<Vec3>> {
         let in_slopes = slopes.clone();
         let out_slopes = slopes;
         let times_s = vec![-1.0, 0.5, 3.0];
-        Keys::try_from(Written { times_s, values, interpolation, in_slopes, out_slopes, period_s }).unwrap()
+        Keys { times_s, values, interpolation, in_slopes, out_slopes, period_s }
     })
 }
 

@@ -11,7 +11,7 @@ use super::accessor;
 use super::document::Document;
 use super::notes::Notes;
 use crate::error::Result;
-use crate::scene::keys::{Between, KeyValue, Keys, Written};
+use crate::scene::keys::{Between, KeyValue, Keys};
 use crate::scene::values::SCALE_LIMIT;
 
 /// Keys of a node.
@@ -133,7 +133,7 @@ impl Channel {
         let width = self.numbers.len() / parts / self.times_s.len().max(1);
         let every =
             |first: usize| self.numbers.chunks_exact(width).skip(first).step_by(parts).map(&value).collect::<Vec<V>>();
-        let written = Written {
+        let keys = Keys {
             values: every(usize::from(is_cubic)),
             in_slopes: if is_cubic { every(0) } else { Vec::new() },
             out_slopes: if is_cubic { every(2) } else { Vec::new() },
@@ -141,7 +141,8 @@ impl Channel {
             interpolation: self.interpolation,
             period_s: self.period_s,
         };
-        Keys::try_from(written).map_err(|what| document.fail(self.place, what))
+        keys.check().map_err(|what| document.fail(self.place, what))?;
+        Ok(keys)
     }
 
     /// Keys of the share of each morph target.

@@ -211,7 +211,7 @@ impl Document {
 }
 
 /// The JSON and the binary part of a file.
-fn split(bytes: &[u8]) -> std::result::Result<(&[u8], Option<&[u8]>), String> {
+pub fn split(bytes: &[u8]) -> std::result::Result<(&[u8], Option<&[u8]>), String> {
     if !bytes.starts_with(b"glTF") {
         return Ok((bytes, None));
     }

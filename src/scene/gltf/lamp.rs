@@ -27,27 +27,25 @@ const SUBDIVISIONS: u32 = 2;
 /// Name of the lamps' mesh.
 pub const BALL: &str = "lamp";
 
-/// What stands for the lights: meshes, which are generated or none but this has, and entities.
-#[derive(Default)]
-pub struct Fittings {
-    /// Meshes with their data.
-    pub meshes: Vec<(MeshData, Mesh)>,
-    /// Lamps.
+/// What stands for the lights of a file that shine.
+pub struct Lamps {
+    /// The mesh of all lamps, if there are any.
+    pub ball: Option<(MeshData, Mesh)>,
     pub entities: Vec<EntityData>,
-}
-
-/// The lights of a file that shine.
-pub struct Lamps<'a> {
-    /// Every light with where it stands.
-    lights: Vec<(&'a Light, &'a Stand)>,
     /// The first directional light.
     pub sun: Option<Sun>,
-    radius_m: f64,
+    /// About the radiance of a white surface in the middle of the scene, lit by all of them.
+    pub radiance: f64,
 }
 
-impl<'a> Lamps<'a> {
-    /// The lights that nodes hold, for a scene of that radius in metres.
-    pub fn new(document: &'a Document, stands: &'a [Stand], scene_radius_m: f64, notes: &mut Notes) -> Result<Self> {
+impl Lamps {
+    /// The lights that nodes hold, for a scene with that bounding sphere (metres).
+    pub fn new(
+        document: &Document,
+        stands: &[Stand],
+        (centre, scene_radius_m): (DVec3, f64),
+        notes: &mut Notes,
+    ) -> Result<Self> {
         let all = document.root.extensions.as_ref().and_then(|e| e.khr_lights_punctual.as_ref());
         let all = all.map_or(&[][..], |e| &e.lights);
         let mut lights = Vec::new();
@@ -74,43 +72,37 @@ impl<'a> Lamps<'a> {
                 _ => lights.push((light, stand)),
             }
         }
-        Ok(Lamps { lights, sun, radius_m: (scene_radius_m * RADIUS_SHARE).clamp(1e-4, 1e4) })
-    }
-
-    /// Their meshes and entities.
-    pub fn entities(&self, document: &Document, notes: &mut Notes) -> Result<Fittings> {
-        let mut out = Fittings::default();
-        if self.lights.is_empty() {
-            return Ok(out);
+        let irradiance = |(light, stand): &(&Light, &Stand)| {
+            let distance_m = centre.distance(stand.rest.translation).max(0.3 * scene_radius_m);
+            f64::from(intensity(light).max_element()) / distance_m.powi(2)
+        };
+        let of_sun = |sun: &Sun| f64::from(sun.radiance.max_element()) * disc_sr(sun.angle_deg);
+        let irradiance = lights.iter().map(irradiance).sum::<f64>() + sun.as_ref().map_or(0.0, of_sun);
+        let mut lamps = Lamps { ball: None, entities: Vec::new(), sun, radiance: irradiance / std::f64::consts::PI };
+        if lights.is_empty() {
+            return Ok(lamps);
         }
         let generator = Generator::Sphere { radius_m: 1.0, subdivisions: SUBDIVISIONS };
-        out.meshes.push((MeshData::new(BALL, Some(generator.clone())), generator.build()?));
+        let mesh = generator.build()?;
+        let radius_m = (scene_radius_m * RADIUS_SHARE).clamp(1e-4, 1e4);
         // A convex body's mean outline is its area over four.
-        let outline_m2 = out.meshes[0].1.area_m2() / 4.0 * self.radius_m.powi(2);
-        for (light, stand) in &self.lights {
+        let outline_m2 = mesh.area_m2() / 4.0 * radius_m.powi(2);
+        for (light, stand) in &lights {
             let emission = intensity(light) / outline_m2 as f32;
             if emission.max_element() > RADIANCE_LIMIT {
                 return Err(document.fail(format!("nodes[{}]", stand.node), "its light is too bright for its size"));
             }
             let name = document.root.nodes[stand.node].name.clone().or_else(|| light.name.clone());
-            let spot = light.spot.as_ref().filter(|_| is_spot(light)).map(|spot| {
+            let is_spot = matches!(light.type_, Checked::Valid(Type::Spot));
+            let spot = light.spot.as_ref().filter(|_| is_spot).map(|spot| {
                 let outer_deg = spot.outer_cone_angle.to_degrees().clamp(0.01, 90.0);
                 Spot { inner_deg: spot.inner_cone_angle.to_degrees().clamp(0.0, outer_deg), outer_deg }
             });
-            out.entities.push(EntityData { emission, name, spot, ..ball(stand, self.radius_m, spot.is_some()) });
+            lamps.entities.push(EntityData { emission, name, spot, ..ball(stand, radius_m, spot.is_some()) });
         }
-        notes.say(format!("point and spot lights ({}) are balls of radius {:.3} m", self.lights.len(), self.radius_m));
-        Ok(out)
-    }
-
-    /// About the radiance of a white surface in the middle of the scene, lit by all lights.
-    pub fn radiance(&self, centre: DVec3, scene_radius_m: f64) -> f64 {
-        let irradiance = |(light, stand): &(&Light, &Stand)| {
-            let distance_m = centre.distance(stand.rest.translation).max(0.3 * scene_radius_m);
-            f64::from(intensity(light).max_element()) / distance_m.powi(2)
-        };
-        let sun = self.sun.as_ref().map_or(0.0, |sun| f64::from(sun.radiance.max_element()) * disc_sr(sun.angle_deg));
-        (self.lights.iter().map(irradiance).sum::<f64>() + sun) / std::f64::consts::PI
+        lamps.ball = Some((MeshData::new(BALL, Some(generator)), mesh));
+        notes.say(format!("point and spot lights ({}) are balls of radius {radius_m:.3} m", lights.len()));
+        Ok(lamps)
     }
 }
 
@@ -134,10 +126,6 @@ fn distant(document: &Document, light: &Light, stand: &Stand, notes: &mut Notes)
     }
     notes.say(format!("the directional light is a distant disc, {SUN_DEG} degrees across"));
     Ok(Sun { toward: toward.as_vec3(), angle_deg: SUN_DEG, radiance })
-}
-
-fn is_spot(light: &Light) -> bool {
-    matches!(light.type_, Checked::Valid(Type::Spot))
 }
 
 /// A ball of that radius in metres where a light stands. A spot's own +y is the light's axis.

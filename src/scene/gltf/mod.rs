@@ -57,7 +57,7 @@ use crate::scene::{ENTITY_LIMIT, MESH_LIMIT, Maps, Surroundings, check_counts};
 use animation::Tracks;
 use document::Document;
 #[cfg(feature = "cli")]
-pub(crate) use document::FILE_LIMIT_BYTES;
+pub(super) use document::{FILE_LIMIT_BYTES, split};
 use lamp::Lamps;
 pub use notes::Notes;
 use pose::Pose;
@@ -108,12 +108,10 @@ pub struct Options {
 /// # Errors
 /// [`Error::Input`] in one line, which names the file and a place of its JSON.
 pub fn load(path: &Path, options: &Options) -> Result<Import> {
-    let document = Document::load(path)?;
-    let mut import = Builder::new(document, path, options)?.build()?;
+    let import = Builder::new(Document::load(path)?, path, options).build()?;
     let meshes = import.data.meshes.len();
     let entities = import.data.entities.len();
     check_counts(meshes, entities).map_err(|what| Error::input(path, what))?;
-    import.meshes.shrink_to_fit();
     Ok(import)
 }
 
@@ -162,6 +160,13 @@ struct Primitive {
     name: String,
 }
 
+impl Primitive {
+    /// The mesh of all pieces or one under a bend.
+    fn mesh(&self, document: &Document, piece: Option<u32>, bend: DMat3, name: &str) -> Result<Mesh> {
+        self.shape.mesh(document, name, bend, self.surface.attributes.clone(), piece)
+    }
+}
+
 /// A primitive of a mesh, in a pose if it is given, or one piece of it.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Part {
@@ -191,7 +196,7 @@ pub(super) struct Reader {
     document: Rc<Document>,
     stage: Option<Rc<Stage>>,
     textures: Textures,
-    primitives: HashMap<PartKey, Option<Primitive>>,
+    primitives: HashMap<PartKey, Option<Rc<Primitive>>>,
     triangle_count: usize,
     notes: Notes,
 }
@@ -231,30 +236,30 @@ impl Reader {
     /// The mesh of a part under a bend.
     pub fn part(&mut self, part: Part, bend: DMat3, name: &str) -> Result<Mesh> {
         let Part { mesh, at, .. } = part;
-        let place = || format!("meshes[{mesh}].primitives[{at}]");
+        let fail = |document: &Document, what| document.fail(format!("meshes[{mesh}].primitives[{at}]"), what);
         let count = self.document.root.meshes.get(mesh).map_or(0, |mesh| mesh.primitives.len());
         if at >= count {
-            return Err(self.document.fail(place(), "there is no such primitive"));
+            return Err(fail(&self.document, "there is no such primitive"));
         }
-        self.read(part)?;
-        let Some(Some(primitive)) = self.primitives.get(&part.key()) else {
-            return Err(self.document.fail(place(), "it has no triangles"));
-        };
-        let has_backs = primitive.surface.has_backs;
-        let attributes = primitive.surface.attributes.clone();
-        let mesh = primitive.shape.mesh(&self.document, name, bend, attributes, part.piece)?;
+        let primitive = self.primitive(part)?.ok_or_else(|| fail(&self.document, "it has no triangles"))?;
+        let mesh = primitive.mesh(&self.document, part.piece, bend, name)?;
+        self.counted(&primitive, mesh)
+    }
+
+    /// Counts the triangles of a mesh that the scene keeps, and adds its backs.
+    fn counted(&mut self, primitive: &Primitive, mesh: Mesh) -> Result<Mesh> {
         self.triangle_count += mesh.triangles.len();
         if self.triangle_count > TRIANGLES_LIMIT {
             let what = format!("over the limit of {TRIANGLES_LIMIT} triangles in all");
             return Err(self.document.fail(&primitive.shape.place, what));
         }
-        Ok(if has_backs && !mesh.is_closed() { mesh.with_backs() } else { mesh })
+        Ok(if primitive.surface.has_backs && !mesh.is_closed() { mesh.with_backs() } else { mesh })
     }
 
-    /// Reads a part once.
-    fn read(&mut self, part: Part) -> Result<()> {
-        if self.primitives.contains_key(&part.key()) {
-            return Ok(());
+    /// The primitive of a part, if it has triangles; each is read once.
+    fn primitive(&mut self, part: Part) -> Result<Option<Rc<Primitive>>> {
+        if let Some(known) = self.primitives.get(&part.key()) {
+            return Ok(known.clone());
         }
         let Part { mesh, at, pose, .. } = part;
         let pose = pose.map(|pose| self.pose(mesh, pose)).transpose()?;
@@ -263,14 +268,14 @@ impl Reader {
         let shape = Shape::read(&document, mesh, at, pose.as_ref(), &mut self.notes)?;
         let primitive = shape.map(|shape| {
             let material = json.primitives[at].material.map(|material| material.value());
-            let notes = &mut self.notes;
-            let surface = Surface::new(&document, material, &shape, &mut self.textures, notes)?;
+            let surface = Surface::new(&document, material, &shape, &mut self.textures, &mut self.notes)?;
             let own = json.name.clone().unwrap_or_else(|| format!("mesh {mesh}"));
             let name = if json.primitives.len() > 1 { format!("{own} {at}") } else { own };
-            Ok(Primitive { shape, surface, material, name })
+            Ok(Rc::new(Primitive { shape, surface, material, name }))
         });
-        self.primitives.insert(part.key(), primitive.transpose()?);
-        Ok(())
+        let primitive = primitive.transpose()?;
+        self.primitives.insert(part.key(), primitive.clone());
+        Ok(primitive)
     }
 
     fn pose(&mut self, mesh: usize, PoseData { node, time_s }: PoseData) -> Result<Pose> {
@@ -306,15 +311,14 @@ impl<'f> Readers<'f> {
 /// What is known of a scene while it is made.
 struct Builder {
     reader: Reader,
-    stage: Rc<Stage>,
     options: Options,
     /// Meshes by primitive, piece and bend, the bend as bits.
-    made: HashMap<(PartKey, Option<u32>, [u64; 9]), usize>,
+    made: HashMap<(PartKey, Option<u32>, [u64; 9]), Made>,
     meshes: Vec<(MeshData, Arc<Mesh>)>,
-    /// Textures by material and number of the image, and the tints that vary the colour.
-    painted: HashMap<(Option<usize>, [u32; 3]), usize>,
-    /// Numbers of the textures that maps became.
-    mapped: HashMap<Map, usize>,
+    /// Names of textures by material and colour.
+    painted: HashMap<(Option<usize>, [u32; 3]), String>,
+    /// Names of the textures that maps became.
+    mapped: HashMap<Map, String>,
     textures: Vec<(TextureData, Arc<Texture>)>,
     names: BTreeSet<String>,
     bent_count: usize,
@@ -322,12 +326,17 @@ struct Builder {
     file: PathBuf,
 }
 
+/// The name of a mesh that was made, and the rotation that its entity has besides.
+#[derive(Clone)]
+struct Made {
+    name: String,
+    turn: DQuat,
+}
+
 impl Builder {
-    fn new(document: Document, path: &Path, options: &Options) -> Result<Self> {
-        let mut reader = Reader::new(document);
-        Ok(Builder {
-            stage: reader.stage()?,
-            reader,
+    fn new(document: Document, path: &Path, options: &Options) -> Self {
+        Builder {
+            reader: Reader::new(document),
             options: options.clone(),
             made: HashMap::new(),
             meshes: Vec::new(),
@@ -337,12 +346,12 @@ impl Builder {
             names: BTreeSet::new(),
             bent_count: 0,
             file: path.file_name().map_or_else(|| path.to_owned(), PathBuf::from),
-        })
+        }
     }
 
     fn build(mut self) -> Result<Import> {
         let document = self.reader.document.clone();
-        let stage = self.stage.clone();
+        let stage = self.reader.stage()?;
         let mut parts = Vec::new();
         let mut posed = 0;
         for stand in &stage.stands {
@@ -399,13 +408,11 @@ impl Builder {
         Ok(entities)
     }
 
-    /// Reads a primitive and tells how many pieces it is cut into. Lamps and surfaces that let light through stay whole,
-    /// and so do the many cards of a plant.
+    /// How many pieces a part is cut into. Lamps and surfaces that let light through stay whole, and so do the many cards
+    /// of a plant.
     fn piece_count(&mut self, stand: &Stand, part: Part) -> Result<u32> {
-        self.reader.read(part)?;
-        let Some(Some(Primitive { shape, surface, .. })) = self.reader.primitives.get(&part.key()) else {
-            return Ok(1);
-        };
+        let Some(primitive) = self.reader.primitive(part)? else { return Ok(1) };
+        let Primitive { shape, surface, .. } = &*primitive;
         let has_alpha = |paint: &Paint| paint.texture.alpha_cutoff.is_some() || paint.texture.alpha_blend;
         let passes_light = surface.opacity < 1.0 || surface.paint.as_ref().is_some_and(has_alpha);
         let is_solid = !passes_light && surface.emission == Vec3::ZERO;
@@ -414,16 +421,13 @@ impl Builder {
 
     /// The entity of a part, if it has triangles.
     fn entity(&mut self, stand: &Stand, part: Part) -> Result<Option<EntityData>> {
-        let Part { mesh, at, .. } = part;
-        let document = self.reader.document.clone();
-        let Some(Some(primitive)) = self.reader.primitives.get(&part.key()) else { return Ok(None) };
+        let Some(primitive) = self.reader.primitive(part)? else { return Ok(None) };
         let Some(parts) = SplitTransform::new(stand.fixed.matrix3) else {
             self.reader.notes.leave_out("shapes that a scale of 0 makes flat");
             return Ok(None);
         };
+        let document = self.reader.document.clone();
         let place = format!("nodes[{}]", stand.node);
-        let Surface { emission, gloss, maps, opacity, .. } = primitive.surface;
-        let has_pattern = primitive.surface.attributes.colors.is_some();
         let scale = parts.uniform_scale().map(|scale| scale as f32);
         if scale.is_some_and(|scale| !(1.0 / SCALE_LIMIT..=SCALE_LIMIT).contains(&scale)) {
             return Err(document.fail(place, "its scale is not within 1e-7 to 1e7"));
@@ -431,30 +435,22 @@ impl Builder {
         if stand.fixed.translation.abs().max_element() > f64::from(POSITION_LIMIT_M) {
             return Err(document.fail(place, "it stands beyond the limit of 1e7 m"));
         }
-        let mut bend = if scale.is_some() { DMat3::IDENTITY } else { parts.bend };
-        let mut rotation = parts.rotation;
-        if emission != Vec3::ZERO
-            && !has_pattern
-            && let Some(rectangle) = self.reader.part(part, bend, "lamp")?.rectangle()
-        {
-            let frame = rectangle.frame();
-            bend = frame.transpose() * bend;
-            rotation *= DQuat::from_mat3(&frame);
-        }
-        let albedo = self.albedo(part);
+        let Surface { emission, gloss, maps, opacity, .. } = primitive.surface;
+        let albedo = self.albedo(&primitive);
         let [gloss_map, normal_map, glow_map] = maps.map(|map| map.map(|map| self.map(map)));
-        let made = self.mesh(part, bend)?;
+        let made = self.mesh(part, &primitive, if scale.is_some() { DMat3::IDENTITY } else { parts.bend })?;
         let mut name = document.root.nodes[stand.node].name.clone().unwrap_or_else(|| format!("node {}", stand.node));
-        if document.root.meshes[mesh].primitives.len() > 1 {
-            name = format!("{name} {at}");
+        if document.root.meshes[part.mesh].primitives.len() > 1 {
+            name = format!("{name} {}", part.at);
         }
         if let Some(piece) = part.piece {
             name = format!("{name}, piece {piece}");
         }
+        let has_pattern = primitive.surface.attributes.colors.is_some();
         Ok(Some(EntityData {
             name: Some(name),
             position: stand.fixed.translation.as_vec3(),
-            rotation: RotationData::Quaternion(rotation.as_quat().to_array()),
+            rotation: RotationData::Quaternion((parts.rotation * made.turn).as_quat().to_array()),
             scale: scale.unwrap_or(1.0),
             albedo,
             gloss,
@@ -465,62 +461,55 @@ impl Builder {
             emits: (has_pattern && emission.max_element() <= 1.0).then_some(false),
             occludes: has_pattern.then_some(true),
             motion: stand.motion.clone(),
-            ..EntityData::of_mesh(&self.meshes[made].0.name)
+            ..EntityData::of_mesh(&made.name)
         }))
     }
 
-    /// The albedo of a part that was read; a paint becomes one of the scene's textures.
-    fn albedo(&mut self, part: Part) -> Albedo {
-        let Some(Some(Primitive { surface, material, .. })) = self.reader.primitives.get(&part.key()) else {
-            unreachable!("the primitive was read")
-        };
+    /// The albedo of a primitive; a paint becomes one of the scene's textures.
+    fn albedo(&mut self, primitive: &Primitive) -> Albedo {
+        let Primitive { surface, material, .. } = primitive;
         let Some(paint) = &surface.paint else { return Albedo::Color(surface.albedo) };
         let key = (*material, surface.albedo.to_array().map(f32::to_bits));
-        let number = *self.painted.entry(key).or_insert_with(|| {
+        let name = self.painted.get(&key).cloned().unwrap_or_else(|| {
             let own = material.and_then(|index| self.reader.document.root.materials[index].name.clone());
             let own = own.unwrap_or_else(|| material.map_or("paint".into(), |index| format!("material {index}")));
-            let is_free = |name: &String| self.textures.iter().all(|(data, _)| data.name != *name);
-            let data = TextureData {
-                file: paint.image.map(|_| self.file.clone()),
-                image: paint.image,
-                ..TextureData::of(free_name(&own, is_free), &paint.texture)
-            };
-            self.textures.push((data, Arc::new(paint.texture.clone())));
-            self.textures.len() - 1
+            self.add_texture(&own, paint.image, paint.texture.clone())
         });
-        Albedo::Texture(self.textures[number].0.name.clone())
+        self.painted.insert(key, name.clone());
+        Albedo::Texture(name)
     }
 
     /// The name of the scene's texture that a map becomes.
     fn map(&mut self, map: Map) -> String {
-        let number = *self.mapped.entry(map).or_insert_with(|| {
-            let is_free = |name: &String| self.textures.iter().all(|(data, _)| data.name != *name);
+        let name = self.mapped.get(&map).cloned().unwrap_or_else(|| {
             let texels = self.reader.texels(map.image).ok();
             let texture = Texture { texels, wrap: map.wrap, factor: Vec3::ONE, alpha_cutoff: None, alpha_blend: false };
-            let data = TextureData {
-                file: Some(self.file.clone()),
-                image: Some(map.image),
-                ..TextureData::of(free_name(&format!("image {}", map.image), is_free), &texture)
-            };
-            self.textures.push((data, Arc::new(texture)));
-            self.textures.len() - 1
+            self.add_texture(&format!("image {}", map.image), Some(map.image), texture)
         });
-        self.textures[number].0.name.clone()
+        self.mapped.insert(map, name.clone());
+        name
     }
 
-    /// Index of the mesh of a part under a bend.
-    fn mesh(&mut self, part: Part, bend: DMat3) -> Result<usize> {
+    /// Adds a texture of an image of the file, if there is one, and returns its name.
+    fn add_texture(&mut self, wanted: &str, image: Option<usize>, texture: Texture) -> String {
+        let name = free_name(wanted, |name| self.textures.iter().all(|(data, _)| data.name != *name));
+        let file = image.map(|_| self.file.clone());
+        let data = TextureData { file, image, ..TextureData::of(name.clone(), &texture) };
+        self.textures.push((data, Arc::new(texture)));
+        name
+    }
+
+    /// The mesh of a part under a bend. A rectangle that glows in one colour is turned to where lamps lie.
+    fn mesh(&mut self, part: Part, primitive: &Primitive, mut bend: DMat3) -> Result<Made> {
         let key = (part.key(), part.piece, bend.to_cols_array().map(|x| (x + 0.0).to_bits()));
         if let Some(made) = self.made.get(&key) {
-            return Ok(*made);
+            return Ok(made.clone());
         }
+        let document = self.reader.document.clone();
         if self.meshes.len() >= MESH_LIMIT {
             let what = format!("over the limit of {MESH_LIMIT} meshes, scaled copies included");
-            return Err(self.reader.document.fail("meshes", what));
+            return Err(document.fail("meshes", what));
         }
-        let Some(Some(primitive)) = self.reader.primitives.get(&part.key()) else {
-            unreachable!("the primitive was read")
-        };
         let is_bent = !((bend.transpose() * bend).abs_diff_eq(DMat3::IDENTITY, 1e-9) && bend.determinant() > 0.0);
         self.bent_count += usize::from(is_bent);
         // Meshes of lamps have names of their own.
@@ -529,10 +518,22 @@ impl Builder {
         let wanted = if is_bent { format!("{own} scaled") } else { own };
         let wanted = part.piece.map_or(wanted.clone(), |piece| format!("{wanted}, piece {piece}"));
         let name = free_name(&wanted, |name| !self.names.contains(name));
-        let made = self.reader.part(part, bend, &name)?;
+        let mut mesh = primitive.mesh(&document, part.piece, bend, &name)?;
+        let mut turn = DQuat::IDENTITY;
+        let Surface { emission, attributes, .. } = &primitive.surface;
+        if *emission != Vec3::ZERO
+            && attributes.colors.is_none()
+            && let Some(rectangle) = mesh.rectangle()
+        {
+            let frame = rectangle.frame();
+            turn = DQuat::from_mat3(&frame);
+            bend = frame.transpose() * bend;
+            mesh = primitive.mesh(&document, part.piece, bend, &name)?;
+        }
+        let mesh = self.reader.counted(primitive, mesh)?;
         self.names.insert(name.clone());
         let data = MeshData {
-            name,
+            name: name.clone(),
             file: Some(self.file.clone()),
             part: Some([part.mesh, part.at]),
             piece: part.piece,
@@ -540,9 +541,10 @@ impl Builder {
             bend: (bend != DMat3::IDENTITY).then(|| bend.to_cols_array()),
             generator: None,
         };
-        self.meshes.push((data, Arc::new(made)));
-        self.made.insert(key, self.meshes.len() - 1);
-        Ok(self.meshes.len() - 1)
+        self.meshes.push((data, Arc::new(mesh)));
+        let made = Made { name, turn };
+        self.made.insert(key, made.clone());
+        Ok(made)
     }
 
     /// Adds lamps, the camera, and light where nothing shines.
@@ -557,8 +559,7 @@ impl Builder {
             self.meshes.iter().map(|(data, mesh)| (data.name.as_str(), mesh.bounding_sphere())).collect();
         let spheres = || entities.iter().filter_map(|entity| Some((*spheres.get(entity.mesh.as_str())?, entity)));
         let bounds = camera::bounds(spheres());
-        let lamps = Lamps::new(document, stands, bounds.1, &mut notes)?;
-        let fittings = lamps.entities(document, &mut notes)?;
+        let lamps = Lamps::new(document, stands, bounds, &mut notes)?;
         let camera = camera::camera(document, stands, self.options.camera.as_deref(), bounds, &mut notes)?;
         let camera_added = camera.is_none();
         let (camera, output) = camera.unwrap_or_else(|| {
@@ -574,22 +575,19 @@ impl Builder {
             let distance_m = centre.distance(bounds.0).max(0.3 * bounds.1);
             f64::from(entity.emission.max_element()) * (radius_m / distance_m).powi(2).min(1.0)
         });
-        let radiance = lamps.radiance(bounds.0, bounds.1) + glow.sum::<f64>();
+        let radiance = lamps.radiance + glow.sum::<f64>();
         let environment = if radiance > 0.0 {
             notes.say("the file has lights but no sky: a dim one is added, so that shadows are not black".into());
             let fill = Vec3::splat((FILL_SHARE * radiance) as f32).min(Vec3::splat(RADIANCE_LIMIT));
-            EnvironmentData { sun: lamps.sun.clone(), uniform: Some(fill), ..EnvironmentData::default() }
+            EnvironmentData { sun: lamps.sun, uniform: Some(fill), ..EnvironmentData::default() }
         } else {
             notes.say("no light in the file is bright enough to see by: daylight is added".into());
             Surroundings::Daylight.data()
         };
-        entities.extend(fittings.entities);
-        let (mut meshes, mut built): (Vec<_>, Vec<_>) = self.meshes.into_iter().unzip();
+        entities.extend(lamps.entities);
+        self.meshes.extend(lamps.ball.map(|(data, mesh)| (data, Arc::new(mesh))));
+        let (meshes, built) = self.meshes.into_iter().unzip();
         let (textures, painted) = self.textures.into_iter().unzip();
-        for (data, mesh) in fittings.meshes {
-            meshes.push(data);
-            built.push(Arc::new(mesh));
-        }
         let data = Data { camera, output, environment, textures, meshes, entities };
         Ok(Import { data, meshes: built, textures: painted, camera_added, notes })
     }

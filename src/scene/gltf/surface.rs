@@ -76,7 +76,8 @@ impl Surface {
         let default = Material::default();
         let json = material.map_or(&default, |index| &document.root.materials[index]);
         let place = material.map_or("the default material".to_owned(), |index| format!("materials[{index}]"));
-        let [r, g, b, alpha] = json.pbr_metallic_roughness.base_color_factor.0;
+        let pbr = &json.pbr_metallic_roughness;
+        let [r, g, b, alpha] = pbr.base_color_factor.0;
         let mut albedo = Vec3::new(r, g, b);
         let mut attributes = Attributes::default();
         if let Some(colors) = shape.attribute(document, &Semantic::Colors(0), &[3, 4], 3)? {
@@ -90,61 +91,59 @@ impl Surface {
         if !(albedo.is_finite() && albedo.min_element() >= 0.0) {
             return Err(document.fail(place, "its base colour is negative or not finite"));
         }
-        let albedo = albedo.min(Vec3::ONE);
-        let metal = json.pbr_metallic_roughness.metallic_roughness_texture.as_ref();
-        let metal = metal.map(|info| textures.applied(info, shape, notes)).transpose()?.flatten();
-        let metal = metal.map_or(1.0, |applied| applied.texels.mean_bytes()[2]);
-        let (opacity, albedo) = passing(json, alpha, metal, albedo);
-        let info = json.pbr_metallic_roughness.base_color_texture.as_ref();
-        let applied = info.map(|info| textures.applied(info, shape, notes)).transpose()?.flatten();
-        let alpha_cutoff = match json.alpha_mode {
-            // The factor's alpha is another factor of what is compared.
-            Checked::Valid(AlphaMode::Mask) => {
-                Some((json.alpha_cutoff.map_or(0.5, |cutoff| cutoff.0) / alpha.max(1e-6)).clamp(0.0, 1.0))
-            }
-            _ => None,
-        };
+        let metal = textures.applied(pbr.metallic_roughness_texture.as_ref(), shape, notes)?;
+        let share_of_metal = metal.as_ref().map_or(1.0, |applied| applied.texels.mean_bytes()[2]);
+        let (opacity, albedo) = passing(json, alpha, share_of_metal, albedo.min(Vec3::ONE));
+        let base = textures.applied(pbr.base_color_texture.as_ref(), shape, notes)?;
+        // The factor's alpha is another factor of what is compared.
+        let alpha_cutoff = matches!(json.alpha_mode, Checked::Valid(AlphaMode::Mask))
+            .then(|| (json.alpha_cutoff.map_or(0.5, |cutoff| cutoff.0) / alpha.max(1e-6)).clamp(0.0, 1.0));
         let alpha_blend = matches!(json.alpha_mode, Checked::Valid(AlphaMode::Blend));
-        let has_backs = json.double_sided && applied.is_some() && (alpha_blend || alpha_cutoff.is_some());
-        let paint = (applied.is_some() || attributes.tints.is_some()).then(|| Paint {
-            image: applied.as_ref().map(|applied| applied.image),
+        let has_backs = json.double_sided && base.is_some() && (alpha_blend || alpha_cutoff.is_some());
+        let paint = (base.is_some() || attributes.tints.is_some()).then(|| Paint {
+            image: base.as_ref().map(|base| base.image),
             texture: Texture {
-                texels: applied.as_ref().map(|applied| applied.texels.clone()),
-                wrap: applied.as_ref().map_or_else(Default::default, |applied| applied.wrap),
+                texels: base.as_ref().map(|base| base.texels.clone()),
+                wrap: base.as_ref().map_or_else(Default::default, |base| base.wrap),
                 factor: albedo,
                 alpha_cutoff,
-                alpha_blend: alpha_blend && applied.as_ref().is_some_and(|applied| applied.texels.has_alpha()),
+                alpha_blend: alpha_blend && base.as_ref().is_some_and(|base| base.texels.has_alpha()),
             },
         });
-        attributes.uvs = applied.and_then(|applied| applied.uvs);
+        attributes.uvs = base.and_then(|base| base.uvs);
         let is_unlit = json.extensions.as_ref().is_some_and(|e| e.unlit.is_some());
-        let mut maps = [None; 3];
-        let mut map = |info: Option<&Info>, attributes: &mut Attributes, notes: &mut Notes| -> Result<_> {
-            let applied = info.filter(|_| !is_unlit).map(|info| textures.applied(info, shape, notes)).transpose()?;
-            let applied = applied.flatten();
-            let map = applied.as_ref().and_then(|applied| Map::of(applied, &mut attributes.uvs));
-            if applied.is_some() && map.is_none() {
-                notes.leave_out("textures with coordinates of their own (their means, or vertices, have their place)");
-            }
-            Ok((map, applied))
-        };
-        let (of_gloss, applied) =
-            map(json.pbr_metallic_roughness.metallic_roughness_texture.as_ref(), &mut attributes, notes)?;
-        let varies = applied.filter(|_| of_gloss.is_none());
-        let gloss = if is_unlit { None } else { Some(gloss(document, json, &place, varies.as_ref())?) };
-        let normal = json.normal_texture.as_ref().map(|normal| Info {
+        let normal = json.normal_texture.as_ref().filter(|_| !is_unlit).map(|normal| Info {
             index: normal.index,
             tex_coord: normal.tex_coord,
             extensions: None,
-            extras: normal.extras.clone(),
+            extras: Default::default(),
         });
-        let (of_normal, _) = map(normal.as_ref(), &mut attributes, notes)?;
-        let (of_emission, _) = map(json.emissive_texture.as_ref(), &mut attributes, notes)?;
-        maps[0] = of_gloss;
-        maps[1] = of_normal;
-        let (emission, colors) = glow(document, json, &place, shape, textures, notes)?;
-        maps[2] = of_emission.filter(|_| emission != Vec3::ZERO);
-        attributes.colors = colors;
+        let normal = textures.applied(normal.as_ref(), shape, notes)?;
+        let light = textures.applied(json.emissive_texture.as_ref(), shape, notes)?;
+        let mut map = |applied: Option<&Applied>| {
+            let applied = applied.filter(|_| !is_unlit)?;
+            let map = Map::of(applied, &mut attributes.uvs);
+            if map.is_none() {
+                notes.leave_out("textures with coordinates of their own (their means, or vertices, have their place)");
+            }
+            map
+        };
+        let mut maps = [map(metal.as_ref()), map(normal.as_ref()), map(light.as_ref())];
+        let gloss = match metal.filter(|_| maps[0].is_none()) {
+            _ if is_unlit => None,
+            varies => Some(gloss(document, json, &place, varies.as_ref())?),
+        };
+        let mut emission = emission(document, json, &place)?;
+        if emission == Vec3::ZERO {
+            maps[2] = None;
+        } else if let Some(applied) = light {
+            let colors = textures.at_vertices(&applied);
+            if colors.len() == shape.vertex_count() {
+                attributes.colors = Some(colors);
+            } else {
+                emission *= colors[0];
+            }
+        }
         Ok(Surface { albedo, paint, gloss, has_backs, opacity, maps, emission, attributes })
     }
 }
@@ -192,29 +191,13 @@ fn is_even(colors: &[Vec3]) -> bool {
     (high - low).max_element() <= EVEN * high.max_element()
 }
 
-/// Emission, and the pattern that a texture gives it.
-fn glow(
-    document: &Document,
-    json: &Material,
-    place: &str,
-    shape: &Shape,
-    textures: &mut Textures,
-    notes: &mut Notes,
-) -> Result<(Vec3, Option<Vec<Vec3>>)> {
+/// Emission where no texture varies it.
+fn emission(document: &Document, json: &Material, place: &str) -> Result<Vec3> {
     let strength = json.extensions.as_ref().and_then(|e| e.emissive_strength.as_ref());
     let strength = strength.map_or(1.0, |s| s.emissive_strength.0);
-    let mut emission = Vec3::from(json.emissive_factor.0) * strength;
+    let emission = Vec3::from(json.emissive_factor.0) * strength;
     if !emission.to_array().iter().all(|c| (0.0..=RADIANCE_LIMIT).contains(c)) {
         return Err(document.fail(place, "its emission is negative, not finite or beyond 1e15"));
     }
-    let Some(info) = json.emissive_texture.as_ref().filter(|_| emission != Vec3::ZERO) else {
-        return Ok((emission, None));
-    };
-    let Some(applied) = textures.applied(info, shape, notes)? else { return Ok((emission, None)) };
-    let colors = textures.at_vertices(&applied);
-    if colors.len() != shape.vertex_count() {
-        emission *= colors[0];
-        return Ok((emission, None));
-    }
-    Ok((emission, Some(colors)))
+    Ok(emission)
 }

@@ -50,8 +50,9 @@ impl Textures {
         Textures { document: document.clone(), images: HashMap::new(), pixels: 0 }
     }
 
-    /// A texture on a shape. `None` where the picture has a format that is not read, which is noted.
-    pub fn applied(&mut self, info: &Info, shape: &Shape, notes: &mut Notes) -> Result<Option<Applied>> {
+    /// A texture on a shape, if there is one and its picture has a format that is read; others are noted.
+    pub fn applied(&mut self, info: Option<&Info>, shape: &Shape, notes: &mut Notes) -> Result<Option<Applied>> {
+        let Some(info) = info else { return Ok(None) };
         let document = self.document.clone();
         let texture = &document.root.textures[info.index.value()];
         let image = source(texture);

@@ -118,6 +118,8 @@ impl Place {
         static TURN: Mutex<()> = Mutex::new(());
         let turn = TURN.lock().unwrap_or_else(PoisonError::into_inner);
         layer::keep_drivers();
+        // Pipelines are made on all cores; on one the calls come in the same order each time. It may have been set before.
+        let _ = rayon::ThreadPoolBuilder::new().num_threads(1).build_global();
         let folder = tempfile::tempdir().unwrap();
         std::fs::write(folder.path().join("scene.toml"), SCENE).unwrap();
         std::fs::write(folder.path().join("mesh.obj"), MESH).unwrap();

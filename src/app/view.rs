@@ -222,6 +222,7 @@ impl App<'_> {
             library: self.context.baker.library().clone(),
             cache: self.context.cache.clone(),
             frame: frame::Options { size: own, antialias, ..self.arguments.options.frame(&scene)? },
+            refines: self.arguments.options.antialias.is_none() && antialias != Antialias::Samples,
             format: target.format(),
             seed: self.global.seed,
             strict: self.arguments.gltf.gltf.strict,

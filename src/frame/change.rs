@@ -101,11 +101,11 @@ impl Frame {
             "smooth.frag",
         ];
         if drawing.into_iter().any(uses) {
-            let before = self.set_pictures(self.options, self.picture.draw.finish())?;
-            if let Err(error) = self.picture.draw.make_those_of(&before) {
-                self.picture.draw = before;
-                return Err(error);
-            }
+            self.refine(false)?;
+            let drawer = self.drawer(&self.options, self.picture.draw.finish())?;
+            drawer.draw.make_those_of(&self.picture.draw)?;
+            self.exchange(drawer);
+            self.picture.other = None;
         }
         if uses("gloss.comp")
             && let Some(reflections) = &mut self.reflections

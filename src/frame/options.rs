@@ -71,7 +71,7 @@ pub struct RenderOptions {
     #[cfg_attr(feature = "cli", arg(long, value_name = "WxH", value_parser = picture_size))]
     pub size: Option<[u32; 2]>,
     /// How edges are smoothed: by four samples a pixel, by redrawing outlines and creases (faster on a software
-    /// device), or not at all. Default: samples, but outlines in a window on a software device
+    /// device), or not at all. Default: samples, but outlines in a window on a software device while things move
     #[cfg_attr(feature = "cli", arg(long, value_name = "HOW"))]
     pub antialias: Option<Antialias>,
     /// Variant of the merge shader: storage, storage-uniform, texel-packed or texel-shifted. They differ in how they

@@ -14,13 +14,25 @@ use crate::error::Result;
 use crate::gpu::{Buffer, BufferKind, Device, Image, Timing};
 use crate::scene::Placement;
 use crate::shaders::Library;
+use crate::sharp::SharpPermutation;
 use half::f16;
 use std::ops::Range;
 use std::sync::Arc;
 
+/// A way to make pictures.
+pub(super) struct Drawer {
+    pub draw: Draw,
+    pixels: Option<SharpPermutation>,
+    antialias: Antialias,
+}
+
 /// The pass "draw" with its images and buffers.
 pub(super) struct FramePicture {
     pub draw: Draw,
+    /// Whether pictures are refined ([`Frame::refine`]).
+    pub refined: bool,
+    /// The other of the coarse and the refined way, once both were wanted.
+    pub other: Option<Drawer>,
     /// Where the host reads a picture.
     pub readback: Buffer,
     /// Outlines and creases of the picture that was prepared last.
@@ -36,6 +48,8 @@ impl FramePicture {
     pub fn new(device: &Arc<Device>, library: &Library, options: &Options, lights: PictureLights) -> Result<Self> {
         Ok(FramePicture {
             draw: Draw::new(device, library, options.size, options.antialias, Finish::Linear, lights)?,
+            refined: false,
+            other: None,
             readback: readback(device, options.size)?,
             lines: Lines::new(device)?,
             prepared: Vec::new(),
@@ -91,15 +105,60 @@ impl Frame {
         halves.chunks_exact(4).flat_map(|p| [p[0].to_f32(), p[1].to_f32(), p[2].to_f32()]).collect()
     }
 
-    /// Makes pictures with these options from now on. Returns the pass that made them so far.
-    pub(super) fn set_pictures(&mut self, options: Options, finish: Finish) -> Result<Draw> {
+    pub(super) fn drawer(&self, options: &Options, finish: Finish) -> Result<Drawer> {
         let sharp = self.sharp.as_ref().map(|sharp| sharp.permutation);
-        let pixels = pixel_shading(&self.device, &options, &self.buffers, self.radiosity.soft(), sharp);
+        let pixels = pixel_shading(&self.device, options, &self.buffers, self.radiosity.soft(), sharp);
         let lights = PictureLights { pixels, highlights: sharp };
         let draw = Draw::new(&self.device, &self.library, options.size, options.antialias, finish, lights)?;
+        Ok(Drawer { draw, pixels, antialias: options.antialias })
+    }
+
+    /// Makes pictures that way from now on. Returns the way in which they were made so far.
+    pub(super) fn exchange(&mut self, drawer: Drawer) -> Drawer {
+        Drawer {
+            draw: std::mem::replace(&mut self.picture.draw, drawer.draw),
+            pixels: std::mem::replace(&mut self.pixels, drawer.pixels),
+            antialias: std::mem::replace(&mut self.options.antialias, drawer.antialias),
+        }
+    }
+
+    /// Makes pictures with these options from now on, and no others.
+    pub(super) fn set_pictures(&mut self, options: Options, finish: Finish) -> Result<()> {
+        let drawer = self.drawer(&options, finish)?;
+        self.exchange(drawer);
         self.options = options;
-        self.pixels = pixels;
-        Ok(std::mem::replace(&mut self.picture.draw, draw))
+        self.picture.other = None;
+        self.picture.refined = false;
+        Ok(())
+    }
+
+    /// Makes pictures of four samples a pixel whose pixels evaluate sharp lights from now on, or those of the options
+    /// again. What makes the others is kept. Returns whether the vertices have to be lit anew, because they have not
+    /// told pixels where edges are so far.
+    pub fn refine(&mut self, refined: bool) -> Result<bool> {
+        if refined == self.picture.refined {
+            return Ok(false);
+        }
+        let drawer = match self.picture.other.take() {
+            Some(drawer) => drawer,
+            None => {
+                let options = Options { antialias: Antialias::Samples, ..self.options };
+                self.drawer(&options, self.picture.draw.finish())?
+            }
+        };
+        self.picture.other = Some(self.exchange(drawer));
+        self.picture.refined = refined;
+        Ok(self.sharp.as_ref().is_some_and(|sharp| sharp.permutation.edges != self.wants_edges()))
+    }
+
+    /// Whether pictures are refined.
+    pub fn is_refined(&self) -> bool {
+        self.picture.refined
+    }
+
+    /// Whether pixels of any pictures evaluate sharp lights.
+    pub(super) fn wants_edges(&self) -> bool {
+        self.pixels.is_some() || self.picture.other.as_ref().is_some_and(|other| other.pixels.is_some())
     }
 
     /// Input of pixels that evaluate sharp lights in a viewport.
@@ -127,6 +186,7 @@ impl Frame {
     /// Makes pictures of another size from now on.
     pub fn resize(&mut self, size: [u32; 2]) -> Result<()> {
         if size != self.options.size {
+            self.refine(false)?;
             let options = Options { size, ..self.options };
             self.set_pictures(options, self.picture.draw.finish())?;
             self.picture.readback = readback(&self.device, size)?;
@@ -148,13 +208,10 @@ impl Frame {
     /// pixel, rows from the top; `white` as in [`Frame::render`]. Waits.
     pub fn still(&mut self, placements: &[Placement], white: f32) -> Result<Vec<f32>> {
         self.device.settle();
-        let options = self.options;
-        let pixels = self.pixels;
-        let draw = self.set_pictures(Options { antialias: Antialias::Samples, ..options }, Finish::Linear)?;
+        let drawer = self.drawer(&Options { antialias: Antialias::Samples, ..self.options }, Finish::Linear)?;
+        let before = self.exchange(drawer);
         let outcome = self.render(placements, Some(white)).map(|_| self.picture());
-        self.options = options;
-        self.pixels = pixels;
-        self.picture.draw = draw;
+        self.exchange(before);
         outcome
     }
 }

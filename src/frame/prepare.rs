@@ -189,7 +189,7 @@ impl Frame {
     /// Has the pass of sharp lights mark the edges of shadows where pixels by now read the marks, and leave them out
     /// where none does. Where they are new, every cluster is merged again.
     fn fit_edges(&mut self) -> Result<()> {
-        let edges = self.pixels.is_some();
+        let edges = self.wants_edges();
         let Some(sharp) = self.sharp.as_mut().filter(|sharp| sharp.permutation.edges != edges) else { return Ok(()) };
         *sharp = Sharp::new(&self.device, &self.library, SharpPermutation { edges, ..sharp.permutation })?;
         if edges {

@@ -35,6 +35,8 @@ pub mod pick;
 mod picture;
 #[cfg(feature = "view")]
 mod preview;
+#[cfg(feature = "view")]
+mod refine;
 pub mod reload;
 mod save;
 pub mod scenes;

@@ -1,5 +1,6 @@
 //! Draws the viewer's frames into a window, an image or files.
 
+use super::command::Changed;
 use super::outline::outline;
 use super::preview;
 use super::save::unedited;
@@ -63,9 +64,12 @@ impl Viewer {
         let mut placements = self.editor.placements();
         let white = self.editor.white();
         let pending = std::mem::take(&mut self.pending);
+        let changed = Changed { display: false, selection: false, ..pending }.any();
+        let resizes = self.frame.as_ref().is_some_and(|frame| frame.size() != size);
+        let [redraws, relights] = self.refine(changed || resizes)?;
         // Clusters that were hidden during motion are lit when motion has ended.
         let stale = self.frame.as_ref().is_some_and(|frame| frame.stale_count() > 0);
-        let light = self.frame.is_some() && (pending.light() || pending.variant || stale);
+        let light = self.frame.is_some() && (pending.light() || pending.variant || stale || relights);
         let mut frame = self.frame.as_mut();
         if let (None, Some(preview)) = (&frame, &mut self.preview) {
             // One without shadows has no suns, which stand behind the entities of the file.
@@ -73,7 +77,9 @@ impl Viewer {
             frame = Some(preview);
         }
         let resized = frame.as_ref().is_some_and(|frame| frame.size() != size);
-        let draws = pending.any() || resized;
+        // Nothing but the overlay has changed where a refined picture stands.
+        let stands = frame.as_ref().is_some_and(|frame| frame.is_refined()) && !changed && !redraws;
+        let draws = pending.any() && !stands || resized || redraws;
         if let Some(frame) = &mut frame {
             frame.resize(size)?;
             let relight = match light {
@@ -131,7 +137,9 @@ impl Viewer {
     /// Waits for the oldest flight and keeps its times.
     pub(super) fn land(&mut self) -> Result<()> {
         if let Some(flight) = self.flights.pop_front() {
-            self.timings.push_back(flight.wait()?);
+            let passes = flight.wait()?;
+            self.pace.note(&passes, self.is_refined());
+            self.timings.push_back(passes);
             if self.timings.len() > HISTORY {
                 self.timings.pop_front();
             }

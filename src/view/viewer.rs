@@ -8,6 +8,7 @@ use super::compare::Reference;
 use super::input::{Event, Input};
 use super::overlay::{Overlay, Paint};
 use super::panel;
+use super::refine::Pace;
 use super::reload::Watch;
 use super::status::ErrorScale;
 use super::task::{BackgroundTask, TaskProgress};
@@ -39,6 +40,8 @@ pub struct Setup {
     pub cache: Cache,
     /// Options of bake and merge; the picture's size is the window's.
     pub frame: frame::Options,
+    /// Whether pictures are refined while nothing moves, and while things move as far as time allows.
+    pub refines: bool,
     /// Format of the frame's target.
     pub format: vk::Format,
     /// Seed of the reference's rays.
@@ -104,6 +107,9 @@ pub struct Viewer {
     pub(super) asked_to_close: bool,
     /// Width and height of the window's picture, pixels.
     pub(super) size: [u32; 2],
+    /// Time at which the picture is refined, unless anything moves before.
+    pub(super) refine_at: Option<Instant>,
+    pub(super) pace: Pace,
     /// Time at which egui wants to be drawn again without an event.
     pub(super) repaint_at: Option<Instant>,
     /// The progress that was shown last.
@@ -151,6 +157,8 @@ impl Viewer {
             quit: false,
             asked_to_close: false,
             size: editor.size(),
+            refine_at: None,
+            pace: Pace::default(),
             repaint_at: Some(Instant::now()),
             told: [None, None],
             counts: None,
@@ -246,7 +254,8 @@ impl Viewer {
     /// Whether a frame would show something new.
     pub fn wants_frame(&self) -> bool {
         let moves = self.editor.running && self.editor.scene().data.entities.iter().any(|e| !e.motion.is_empty());
-        self.pending.any() || moves && self.frame.is_some() || self.repaint_at.is_some_and(|at| at <= Instant::now())
+        let is_due = |at: Option<Instant>| at.is_some_and(|at| at <= Instant::now());
+        self.pending.any() || moves && self.frame.is_some() || is_due(self.repaint_at) || is_due(self.refine_at)
     }
 
     /// Time until [`Viewer::update`] should run again; `None` if it can wait for an event.
@@ -254,8 +263,9 @@ impl Viewer {
         let busy =
             self.bake.is_some() || self.rays.as_ref().is_some_and(BackgroundTask::is_running) || self.watch.is_some();
         let poll = (busy || !self.messages.is_empty()).then_some(Duration::from_millis(100));
-        let repaint = self.repaint_at.map(|at| at.saturating_duration_since(Instant::now()));
-        poll.into_iter().chain(repaint).min()
+        let wakes = self.repaint_at.into_iter().chain(self.refine_at);
+        let wakes = wakes.map(|at| at.saturating_duration_since(Instant::now()));
+        poll.into_iter().chain(wakes).min()
     }
 
     /// Handles an event of the window that egui does not use.

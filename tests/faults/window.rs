@@ -46,6 +46,7 @@ pub fn viewer(folder: &Path, device: Arc<Device>, options: DeviceOptions, format
         format,
         seed: 1,
         strict: false,
+        refines: false,
         preview_after: Duration::from_secs(60),
     };
     let editor = Editor::new(Scene::load(&path)?, &path);

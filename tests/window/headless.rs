@@ -8,7 +8,7 @@ use shadow_fields::error::Error;
 use shadow_fields::scene::{Lights, Scene};
 use shadow_fields::view::command::Command;
 use shadow_fields::view::input::{Button, Event, Key};
-use shadow_fields::view::{Previewed, Setup};
+use shadow_fields::view::{Previewed, Setup, Viewer};
 use std::collections::HashSet;
 use std::path::Path;
 use std::time::Duration;
@@ -122,6 +122,39 @@ fn a_bake_shows_its_light_before_it_ends() {
     let off: u64 = first.iter().flatten().zip(whole.iter().flatten()).map(|(a, b)| u64::from(a.abs_diff(*b))).sum();
     let mean = off as f64 / (4 * whole.len()) as f64;
     assert!(mean < 6.0, "{mean} of 255 in the mean");
+}
+
+/// At rest a window of a software device shows what four samples a pixel and lights at pixels give, and draws that once.
+#[test]
+fn a_picture_is_refined_once_nothing_moves() {
+    let coarse = |setup: &mut Setup| {
+        setup.refines = true;
+        setup.frame.antialias = Antialias::Outlines;
+        setup.frame.lights = Lights::Sharp;
+        setup.frame.shading = None;
+    };
+    let Some(mut stand) = Stand::with("refined", coarse) else { return };
+    stand.ready();
+    assert!(!stand.viewer.is_refined());
+    let before = stand.shown();
+    stand.until("a refined picture", Viewer::is_refined);
+    let refined = stand.shown();
+    assert!(apart(&before, &refined) > 20, "edges are as they were");
+    stand.options.antialias = Antialias::Samples;
+    as_rendered(&mut stand, "refined");
+    stand.viewer.apply(Command::ToggleOverlay).unwrap();
+    stand.viewer.apply(Command::ToggleOverlay).unwrap();
+    stand.turn();
+    stand.viewer.settle().unwrap();
+    assert_eq!(stand.viewer.last_passes().join(" "), "show", "the overlay draws nothing again");
+    assert!(stand.viewer.is_refined());
+    // Beside the error's colours it is of vertices again.
+    stand.viewer.apply(Command::ToggleReference).unwrap();
+    stand.turn();
+    assert!(!stand.viewer.is_refined());
+    stand.viewer.apply(Command::ToggleReference).unwrap();
+    stand.until("a refined picture again", Viewer::is_refined);
+    assert_eq!(apart(&refined, &stand.shown()), 0);
 }
 
 #[test]

@@ -21,7 +21,7 @@ pub struct Stand {
     pub viewer: Viewer,
     image: Image,
     readback: Buffer,
-    options: frame::Options,
+    pub options: frame::Options,
     pub cache: PathBuf,
     pub gpu: Gpu,
 }
@@ -46,6 +46,7 @@ impl Stand {
             library: gpu.library.clone(),
             cache: Cache::new(Some(&cache)),
             frame: frame::Options { size: SIZE, ..shadow_fields::check::merge::options() },
+            refines: false,
             format: FORMAT,
             seed: 1,
             strict: false,

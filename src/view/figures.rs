@@ -17,8 +17,10 @@ pub(super) fn figures(ui: &mut Ui, editor: &Editor, status: &Status<'_>, command
     let [width, height] = status.size;
     let name = editor.path().file_stem().unwrap_or_default().to_string_lossy();
     let paused = if editor.running { "" } else { ", paused" };
-    let refined = if status.refined { ", refined" } else { "" };
-    ui.label(format!("{name}, {width} x {height}, {:.2} s{paused}{refined}", editor.time_s));
+    ui.label(format!("{name}, {width} x {height}, {:.2} s{paused}", editor.time_s));
+    if let Some(refined) = status.refined {
+        ui.label(if refined { "picture: refined" } else { "picture: coarse while things move" });
+    }
     let selected = editor.selection.map_or("nothing".to_owned(), |i| {
         let entity = &editor.scene().entities[i];
         let role = if entity.emits {

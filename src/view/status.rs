@@ -32,8 +32,8 @@ pub struct Status<'s> {
     pub driver: &'s str,
     /// Width and height of the picture, pixels.
     pub size: [u32; 2],
-    /// Whether the picture is refined.
-    pub refined: bool,
+    /// Whether the picture is refined; `None` where it never is.
+    pub refined: Option<bool>,
     /// Times of the passes of the last frames, oldest first.
     pub timings: &'s VecDeque<Vec<Timing>>,
     /// Lookups of the last merge.

@@ -40,7 +40,7 @@ impl Viewer {
             device: &info.name,
             driver: &info.driver,
             size: self.size,
-            refined: self.is_refined(),
+            refined: self.setup.refines.then(|| self.is_refined()),
             timings: &self.timings,
             counts: self.counts.as_ref().map(|(_, counts)| *counts),
             merged: self.frame.as_ref().map(|f| (f.merged().merged_clusters, f.merged().clusters)),

@@ -52,7 +52,7 @@ impl Stand {
             device: "llvmpipe (LLVM 15.0.6, 256 bits)",
             driver: "llvmpipe, Mesa 22.3.6 (LLVM 15.0.6)",
             size: [1280, 720],
-            refined: true,
+            refined: Some(true),
             timings: &timings,
             counts: Some(Counts { considered: 123_456, ..Counts::default() }),
             merged: Some((1234, 5678)),

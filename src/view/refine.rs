@@ -44,14 +44,15 @@ impl Viewer {
     /// Decides whether the next picture is refined; `moves` if it differs from the last in more than the overlay.
     /// Returns whether it has to be drawn for that, and whether its vertices have to be lit.
     pub(super) fn refine(&mut self, moves: bool) -> Result<[bool; 2]> {
-        let Some(frame) = &mut self.frame else { return Ok([false; 2]) };
+        let due = self.refine_at.take();
+        let Some(frame) = &self.frame else { return Ok([false; 2]) };
         let was = frame.is_refined();
-        let is_due = self.refine_at.is_some_and(|at| at <= Instant::now());
+        let is_due = due.is_some_and(|at| at <= Instant::now());
         // Beside a reference, and where the error is shown, both are of vertices.
         let can = self.setup.refines && !self.editor.error && !self.editor.reference;
         let refines = can && if moves { self.pace.allows() } else { was || is_due };
-        if moves || is_due {
-            self.refine_at = (can && !refines).then(|| Instant::now() + REST);
+        if can && !refines {
+            self.refine_at = due.filter(|_| !moves).or_else(|| Some(Instant::now() + REST));
         }
         if refines == was {
             return Ok([false; 2]);

@@ -33,6 +33,7 @@ use ash::vk;
 use bytemuck::{Pod, Zeroable};
 pub use choices::{Antialias, Finish, Shading};
 use glam::{Mat4, Vec3};
+use std::collections::HashSet;
 use std::ops::Range;
 use std::sync::{Arc, OnceLock};
 
@@ -234,6 +235,8 @@ pub struct Draw {
     /// The most triangles that one render pass draws; the next one goes on. llvmpipe keeps all triangles of a render
     /// pass until its end: for two million triangles it held 300 MiB, and 50 MiB when they were divided.
     pub batch_triangles: u32,
+    /// Whether [`Draw::make`] has made the pipelines of the scene.
+    pub is_made: bool,
     /// Pass "smooth", which follows where outlines are smoothed.
     pub smooth: Option<Smooth>,
 }
@@ -264,6 +267,7 @@ impl Draw {
             depth: Image::new(device, "draw depth", ImageShape { format: DEPTH, samples, ..shape })?,
             picture: Image::new(device, "picture", shape)?,
             batch_triangles: if device.info.is_software() { 1 << 18 } else { u32::MAX / 3 },
+            is_made: false,
             smooth: (antialias == Antialias::Outlines)
                 .then(|| Smooth::new(device, library, shape, display))
                 .transpose()?,
@@ -272,7 +276,7 @@ impl Draw {
 
     /// Makes the pipelines of these surfaces, and of grids if there are `grids`, on all cores: one may take a second to
     /// compile. Others are made where they are first drawn with.
-    pub fn make(&self, surfaces: &[DrawnSurface], grids: bool) -> Result<()> {
+    pub fn make(&self, surfaces: HashSet<DrawnSurface>, grids: bool) -> Result<()> {
         let grid = || if grids { self.grid.make() } else { Ok(()) };
         let (triangles, grid) = rayon::join(|| self.triangles.make(surfaces), grid);
         triangles.and(grid)

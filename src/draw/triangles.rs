@@ -17,6 +17,7 @@ use ash::vk;
 use bytemuck::{Pod, Zeroable};
 use glam::{Vec2, Vec3};
 use rayon::prelude::*;
+use std::collections::HashSet;
 use std::ops::Range;
 use std::sync::{Arc, OnceLock};
 
@@ -220,16 +221,15 @@ impl DrawTriangles {
     }
 
     /// Makes what surfaces are drawn with, on all cores.
-    pub fn make(&self, surfaces: &[DrawnSurface]) -> Result<()> {
-        let forms = |surface: &DrawnSurface| match surface.transparent {
-            true => vec![Form::OverDepth, Form::Over],
-            false if self.maker.sharp.is_some() => vec![Form::Vertices, Form::Pixels],
-            false => vec![Form::Vertices],
-        };
-        let made = |surface: &DrawnSurface| forms(surface).into_iter().map(|form| (*surface, form)).collect::<Vec<_>>();
-        let pipelines: Vec<_> = surfaces.iter().flat_map(made).collect();
-        pipelines.into_par_iter().try_for_each(|(surface, form)| {
-            self.pipeline(self.look_of(surface.painted, surface.detail), form).map(|_| ())
+    pub fn make(&self, surfaces: HashSet<DrawnSurface>) -> Result<()> {
+        surfaces.into_par_iter().try_for_each(|surface| {
+            let forms: &[Form] = match surface.transparent {
+                true => &[Form::OverDepth, Form::Over],
+                false if self.maker.sharp.is_some() => &[Form::Vertices, Form::Pixels],
+                false => &[Form::Vertices],
+            };
+            let look = self.look_of(surface.painted, surface.detail);
+            forms.par_iter().try_for_each(|form| self.pipeline(look, *form).map(|_| ()))
         })
     }
 

@@ -28,7 +28,6 @@ use crate::bake::ensure::SceneProgress;
 use crate::bake::surfaces::SurfacePlan;
 use crate::bake::{self, Baker, SceneNeeds};
 use crate::bounce::{Bounce, BounceWork, Bounces, Linked, LinkedEntity};
-use crate::draw::triangles::DrawnSurface;
 use crate::draw::{PictureLights, Shading};
 use crate::error::Result;
 use crate::gloss::Reflections;
@@ -39,7 +38,7 @@ use crate::merge::calibrate;
 use crate::merge::variant::{MergePermutation, Reads, Variant, uniform_entities};
 use crate::merge::{Merge, MergeInputs, Readable};
 use crate::scene::groups::Groups;
-use crate::scene::{Entity, LightMethod, Lights, Placement, Scene, light};
+use crate::scene::{LightMethod, Lights, Placement, Scene, light};
 use crate::scene_buffers::{SceneBuffers, limits};
 use crate::shaders::Library;
 use crate::sharp::{self, Sharp, SharpPermutation};
@@ -49,7 +48,6 @@ use pixel::PixelChains;
 use prepare::ClusterWork;
 use radiosity::RadiosityBuffers;
 use sky::SkyLight;
-use std::collections::HashSet;
 use std::ops::Range;
 use std::sync::Arc;
 
@@ -69,18 +67,6 @@ fn methods(scene: &Scene, lights: Lights) -> Vec<LightMethod> {
 /// Largest albedo of each entity, of any colour.
 fn albedos(scene: &Scene) -> Vec<f32> {
     scene.entities.iter().map(|entity| entity.albedo.max_element()).collect()
-}
-
-/// What the receivers of a scene are drawn with.
-fn surfaces_of(scene: &Scene, buffers: &SceneBuffers, reflects: bool) -> Vec<DrawnSurface> {
-    let entities = scene.entities.iter().enumerate();
-    let triangles = entities.filter(|(index, _)| buffers.surface(*index).drawn.grid().is_none());
-    let of = |(index, entity): (usize, &Entity)| DrawnSurface {
-        painted: scene.paint(index).is_some(),
-        detail: gloss::detail(entity).filter(|_| reflects),
-        transparent: entity.transparent,
-    };
-    triangles.map(of).collect::<HashSet<_>>().into_iter().collect()
 }
 
 /// A scene on a device, ready to be lit and drawn at any time.
@@ -191,15 +177,11 @@ impl Frame {
         let soft = sharp.is_some();
         let sharp = sharp.map(|fitting| SharpPermutation { edges: pixels.is_some(), ..fitting });
         let picture = FramePicture::new(device, library, &options, PictureLights { pixels, highlights: sharp })?;
-        let has_grids = (0..entity_count).any(|entity| buffers.surface(entity).drawn.grid().is_some());
         // Shaders take long to compile, so that this is done on all cores.
-        let drawn = || picture.draw.make(&surfaces_of(&scene, &buffers, reflections.is_some()), has_grids);
         let merging = || Merge::new(device, library, permutation);
         let lighting = || sharp.map(|permutation| Sharp::new(device, library, permutation)).transpose();
         let bouncing = || linked.map(|linked| Bounce::new(device, library, linked, soft, permutation, self_cells));
-        let (drawn, (merge, (sharp, bounce))) =
-            rayon::join(drawn, || rayon::join(merging, || rayon::join(lighting, bouncing)));
-        drawn?;
+        let (merge, (sharp, bounce)) = rayon::join(merging, || rayon::join(lighting, bouncing));
         let mut bounce = bounce.transpose()?;
         if let Some(bounce) = &mut bounce {
             bounce.set_albedos(&albedos(&scene))?;

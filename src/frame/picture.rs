@@ -4,11 +4,12 @@ use super::permutation::pixel_shading;
 use super::record::PictureWork;
 use super::room::READBACK_PIXEL_BYTES;
 use super::viewport::Viewport;
-use super::{Frame, Options};
+use super::{Frame, Options, gloss};
 use crate::asset::edges::Edges;
 use crate::asset::picture::linear_from_srgb;
 use crate::draw::pixel_light::PixelLight;
 use crate::draw::smooth::Lines;
+use crate::draw::triangles::DrawnSurface;
 use crate::draw::{Antialias, Draw, DrawnViewport, Finish, PictureLights};
 use crate::error::Result;
 use crate::gpu::{Buffer, BufferKind, Device, Image, Timing};
@@ -16,6 +17,7 @@ use crate::scene::Placement;
 use crate::shaders::Library;
 use crate::sharp::SharpPermutation;
 use half::f16;
+use std::collections::HashSet;
 use std::ops::Range;
 use std::sync::Arc;
 
@@ -64,6 +66,22 @@ fn readback(device: &Arc<Device>, [width, height]: [u32; 2]) -> Result<Buffer> {
 }
 
 impl Frame {
+    /// Makes the pipelines of all that pictures of light show, before the first one.
+    pub(super) fn make_pipelines(&mut self) -> Result<()> {
+        if std::mem::replace(&mut self.picture.draw.is_made, true) {
+            return Ok(());
+        }
+        let is_grid = |entity: &usize| self.buffers.surface(*entity).drawn.grid().is_some();
+        let (grids, triangles): (Vec<usize>, Vec<usize>) = (0..self.scene.entities.len()).partition(is_grid);
+        let surface = |index: usize| DrawnSurface {
+            painted: self.scene.paint(index).is_some(),
+            detail: gloss::detail(&self.scene.entities[index]).filter(|_| self.reflections.is_some()),
+            transparent: self.scene.entities[index].transparent,
+        };
+        let surfaces: HashSet<DrawnSurface> = triangles.into_iter().map(surface).collect();
+        self.picture.draw.make(surfaces, !grids.is_empty())
+    }
+
     /// Input of [`super::record()`] for the picture that was prepared last; `white` as in [`Frame::render`].
     pub fn picture_work(&self, placements: &[Placement], white: f32) -> PictureWork<'_> {
         let viewport = |(viewport, lines): &(Viewport, Range<u32>)| DrawnViewport {

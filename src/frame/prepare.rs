@@ -88,6 +88,9 @@ impl Frame {
             self.prepare_merge(placements, if relight == Relight::Seen { viewports } else { &[] })?;
             self.fit_lists()?;
         }
+        if viewports.iter().any(Viewport::shows_light) {
+            self.make_pipelines()?;
+        }
         if !viewports.is_empty() {
             self.prepare_chains()?;
             self.prepare_gloss(placements)?;

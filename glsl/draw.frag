@@ -5,7 +5,7 @@ layout(location = 0) centroid in vec4 radiance; // w: 1
 layout(location = 0) out vec4 color; // alpha: the entity's tag
 #if PAINTED
 layout(location = 1) centroid in vec3 light; // of a surface of the mean reflectance
-layout(location = 2) centroid in vec2 uv;
+layout(location = 2) in vec2 uv;
 layout(binding = 0) uniform sampler2D picture;
 #include "holes.glsl"
 #endif
@@ -48,7 +48,7 @@ void main() {
     float within = within_triangle(radiance.w);
     vec3 shown = radiance.rgb;
 #if PAINTED
-    vec4 texel = texture(picture, within * uv);
+    vec4 texel = texture(picture, uv);
     cut_holes(texel.a, push.paint.w);
     vec3 over_mean = push.paint.rgb * texel.rgb;
 #if OVER
@@ -60,8 +60,8 @@ void main() {
 #endif
 #if GLOSS
     vec3 base = over_mean * within * tint * gloss_entity_at(push.entity).albedo;
-    shown = glow(push.entity, within * shown, push.emission_white.rgb, within * uv);
-    shown += glossy(push.entity, base, over_mean * within * light, within * uv, within);
+    shown = glow(push.entity, within * shown, push.emission_white.rgb, uv);
+    shown += glossy(push.entity, base, over_mean * within * light, uv, within);
 #if OVER
     color = over(finish(shown, push.emission_white.w), opacity);
 #else

@@ -3,8 +3,8 @@
 layout(binding = GLOSS_BINDING) uniform textureBuffer gloss_entities;
 #include "generated/gloss_structs.glsl"
 #include "generated/gloss_entity_at.glsl"
-layout(location = 6) centroid in vec3 from_eye; // world axes, metres
-layout(location = 7) centroid in vec3 normal;   // world
+layout(location = 6) in vec3 from_eye; // world axes, metres
+layout(location = 7) centroid in vec3 normal; // world
 layout(location = 8) centroid in vec4 first;    // glsl/gloss.comp
 layout(location = 9) centroid in vec3 second;
 #if HIGHLIGHTS
@@ -61,7 +61,6 @@ vec3 open_light(GlossEntity entity, vec3 n, vec3 ground, vec3 place, vec3 bounce
 // within_triangle.
 vec3 glossy(uint index, vec3 base, vec3 light, vec2 uv, float within) {
     GlossEntity entity = gloss_entity_at(index);
-    vec3 place = within * from_eye;
     vec3 n = normalize(normal);
     float roughness = entity.roughness, metallic = entity.metallic;
     Reflection found = Reflection(within * first.rgb, within * second);
@@ -74,14 +73,14 @@ vec3 glossy(uint index, vec3 base, vec3 light, vec2 uv, float within) {
     vec4 of_gloss = texture(gloss_picture, uv);
     roughness = clamp(entity.factors.x * of_gloss.g, 0.0, 1.0);
     metallic = clamp(entity.factors.y * of_gloss.b, 0.0, 1.0);
-    vec3 mapped = mapped_normal(n, place, uv, entity.factors.z);
-    vec3 smooth_light = open_light(entity, n, n, place, found.grazing, share);
-    vec3 mapped_light = open_light(entity, mapped, n, place, found.grazing, share);
+    vec3 mapped = mapped_normal(n, from_eye, uv, entity.factors.z);
+    vec3 smooth_light = open_light(entity, n, n, from_eye, found.grazing, share);
+    vec3 mapped_light = open_light(entity, mapped, n, from_eye, found.grazing, share);
     light *= clamp(mapped_light / max(smooth_light, vec3(1e-20)), vec3(0.0), vec3(MOST_TILTED));
-    View view = view_of(place, mapped, roughness);
+    View view = view_of(from_eye, mapped, roughness);
     view.ground = n;
 #else
-    View view = view_of(place, n, roughness);
+    View view = view_of(from_eye, n, roughness);
 #endif
     float energy = within * first.w;
 #if MIRROR
@@ -97,7 +96,7 @@ vec3 glossy(uint index, vec3 base, vec3 light, vec2 uv, float within) {
     uint i = 0;
     do {
         Entity shining = ENTITY(entity.lights[i] == NONE ? 0 : entity.lights[i]);
-        vec2 part = share[i] * reflect_light(view, shining.centre.xyz - entity.eye - place, shining);
+        vec2 part = share[i] * reflect_light(view, shining.centre.xyz - entity.eye - from_eye, shining);
         found.facing += part.x * shining.emission;
         found.grazing += part.y * shining.emission;
         i++;

@@ -11,7 +11,7 @@ layout(location = 1) centroid in vec3 weights;
 layout(location = 2) flat in uvec3 triangle;
 layout(location = 3) centroid in vec3 emission;
 #if PAINTED
-layout(location = 4) centroid in vec2 uv;
+layout(location = 4) in vec2 uv;
 layout(location = 5) centroid in vec3 tint;
 layout(binding = 12) uniform sampler2D picture;
 #include "holes.glsl"
@@ -31,7 +31,7 @@ void main() {
     uvec3 lit = push.first + triangle;
     float within = within_triangle(weights.x + weights.y + weights.z);
 #if PAINTED
-    vec4 texel = texture(picture, within * uv);
+    vec4 texel = texture(picture, uv);
     cut_holes(texel.a, push.paint.w);
     vec3 reflectance = push.paint.rgb * texel.rgb * within * tint;
 #else
@@ -57,9 +57,9 @@ void main() {
     }
 #if GLOSS
     vec3 base = reflectance * gloss_entity_at(push.receiver).albedo;
-    light = glossy(push.receiver, base, reflectance * light, within * uv, within);
+    light = glossy(push.receiver, base, reflectance * light, uv, within);
     reflectance = vec3(1.0);
-    vec3 glowing = glow(push.receiver, within * push.emission_white.rgb * emission, push.emission_white.rgb, within * uv);
+    vec3 glowing = glow(push.receiver, within * push.emission_white.rgb * emission, push.emission_white.rgb, uv);
 #else
     vec3 glowing = within * push.emission_white.rgb * emission;
 #endif

@@ -378,6 +378,40 @@ fn textures_multiply_the_light_of_a_grey_surface() {
     assert!(compared[0].min(compared[2]).min(compared[3]) > 20, "{compared:?}");
 }
 
+/// Far from edges a texture looks the same with four samples a pixel as with one, also where it is seen slanted.
+#[test]
+fn textures_are_even_under_four_samples() {
+    let Some(stage) = stage() else { return };
+    let corners = [[-2.0, -1.0, 2.0], [2.0, -1.0, 2.0], [2.0, 0.5, -8.0], [-2.0, 0.5, -8.0]].map(Vec3::from).to_vec();
+    let uvs = [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]].map(Vec2::from).to_vec();
+    let attributes = Attributes { uvs: Some(uvs), ..Attributes::default() };
+    let mesh = Mesh::with_attributes("floor", corners, Vec::new(), attributes, vec![[0, 1, 2], [0, 2, 3]]).unwrap();
+    let rgba = (0..16 * 16).map(|i| [255 * (i as u8 % 2), 255 * (i / 16 % 2) as u8, 0, 255]).collect();
+    let texels = Some(Arc::new(Texels { width: 16, height: 16, rgba }));
+    let texture = Texture { texels, wrap: [Wrap::Clamp; 2], factor: Vec3::ONE, alpha_cutoff: None, alpha_blend: false };
+    let scene = Scene::builder()
+        .camera(Camera::new([0.0, 0.5, 5.0], [0.0, -0.2, 0.0]))
+        .environment(EnvironmentData { uniform: Some(Vec3::ONE), ..EnvironmentData::default() })
+        .texture("checks", texture)
+        .mesh("floor", mesh)
+        .entity(EntityData { albedo: Albedo::Texture("checks".into()), ..EntityData::of_mesh("floor") });
+    let scene = scene.build().unwrap();
+    let [one, four] = [Antialias::None, Antialias::Samples].map(|antialias| {
+        let mut frame = stage.frame(&scene, options(antialias));
+        frame.render(&scene.at(0.0), Some(f32::INFINITY)).unwrap();
+        frame.picture()
+    });
+    let mut compared = 0;
+    for (one, four) in one.chunks_exact(3).zip(four.chunks_exact(3)) {
+        // The sky is blue too; a pixel of an edge has some of it.
+        if one[2] == 0.0 && four[2] == 0.0 {
+            assert!((one[0] - four[0]).abs().max((one[1] - four[1]).abs()) < 0.01, "{one:?} and {four:?}");
+            compared += 1;
+        }
+    }
+    assert!(compared > 1000, "{compared} pixels");
+}
+
 /// A picture for a screen is the linear one over white, in 8 bits of sRGB.
 #[test]
 fn screens_are_shown_the_same() {

@@ -247,15 +247,17 @@ impl<'s> World<'s> {
         })
     }
 
-    /// The first surface that a ray (unit direction) from a point of a surface meets, of entities that occlude. What is
-    /// transparent keeps its share of rays back and reflects none.
+    /// The first surface that a ray (unit direction) from a point of a surface meets, of entities that occlude; `None`
+    /// also past what reflects nothing: a transparent entity, which keeps its share of rays back, and a lamp, whose own
+    /// light is counted as direct light.
     pub fn first_surface(&self, view: &VertexView, direction: DVec3) -> Option<(usize, SurfaceHit)> {
         let others = self.occluders(view);
         let (panes, others): (Vec<_>, Vec<_>) =
             others.iter().chain(view.own()).partition(|sight| self.scene.entities[sight.entity].transparent);
         let met = others.into_iter().filter_map(|sight| Some((sight, self.first_hit_m(sight, direction)?)));
         let (sight, limit_m) = met.min_by(|a, b| a.1.total_cmp(&b.1))?;
-        let is_kept_back = panes.iter().any(|pane| self.blocks(pane, direction, limit_m));
+        let lamps = self.lights(view);
+        let is_kept_back = panes.into_iter().chain(&lamps).any(|sight| self.blocks(sight, direction, limit_m));
         if is_kept_back { None } else { Some((sight.entity, self.surface_hit(sight, direction)?)) }
     }
 

@@ -130,6 +130,7 @@ struct SeenPanel {
     half: [DVec3; 2],
     /// Square metres.
     area: f64,
+    is_rectangle: bool,
     pattern: Pattern,
 }
 
@@ -163,15 +164,16 @@ impl SeenLight {
     /// The face of a panel with that bounding sphere, turned by `rotation`.
     pub fn panel(to: DVec3, radius: f64, panel: LampFace, rotation: DQuat) -> Self {
         let half = radius * panel.half();
-        let (area, pattern) = match panel {
-            LampFace::Disc(_) => (PI * half.x * half.y, Pattern::DISC),
-            LampFace::Rectangle(_) | LampFace::Sheet(_) => (4.0 * half.x * half.y, Pattern::rectangle(half)),
+        let is_rectangle = !matches!(panel, LampFace::Disc(_));
+        let (area, pattern) = match is_rectangle {
+            true => (4.0 * half.x * half.y, Pattern::rectangle(half)),
+            false => (PI * half.x * half.y, Pattern::DISC),
         };
         let half = [rotation * (half.x * DVec3::X), rotation * (half.y * DVec3::Z)];
         let front = rotation * DVec3::Y;
         let shows_back = matches!(panel, LampFace::Sheet(_)) && front.dot(to) > 0.0;
         let normal = if shows_back { -front } else { front };
-        let seen = SeenPanel { normal, half, area, pattern };
+        let seen = SeenPanel { normal, half, area, is_rectangle, pattern };
         SeenLight { panel: Some(seen), ..Self::new(to, radius) }
     }
 
@@ -195,9 +197,29 @@ impl SeenLight {
         self.panel.map(|panel| panel.normal)
     }
 
-    /// Irradiance of an unoccluded light of radiance 1.
+    /// Irradiance of an unoccluded light of radiance 1: of a rectangle exact, else the sum of its parts.
     pub fn irradiance(&self, normal: DVec3) -> f64 {
+        let sum = self.irradiance_by_parts(normal);
+        match self.panel.filter(|panel| panel.is_rectangle && sum > 0.0) {
+            Some(SeenPanel { half: [x, z], .. }) => {
+                let middle = self.distance * self.toward;
+                let corners = [middle - x - z, middle + x - z, middle + x + z, middle - x + z];
+                polygon_irradiance(&corners, normal)
+            }
+            None => sum,
+        }
+    }
+
+    fn irradiance_by_parts(&self, normal: DVec3) -> f64 {
         self.blocks().iter().flat_map(|(_, parts)| parts).map(|part| part.share(normal)).sum()
+    }
+
+    /// Light where nothing is between, over that of the parts, which are coarse near by.
+    pub fn over_parts(&self, normal: DVec3) -> f64 {
+        match self.irradiance_by_parts(normal) {
+            0.0 => 1.0,
+            sum => self.irradiance(normal) / sum,
+        }
     }
 
     /// Cosine of the angle between a ball's middle and a place on its disc.
@@ -238,6 +260,25 @@ impl SeenLight {
         let whole = area * (-panel.normal.dot(toward)).max(0.0) / (distance * distance + area / PI);
         LightPart { toward, distance, sine: (whole / PI).sqrt().min(MOST_SINE), weight: whole * block.weight }
     }
+}
+
+/// Irradiance of a surface at the origin by a convex polygon of radiance 1, of which it sees what is above its horizon:
+/// the sum over the edges of half of the angle each fills, times the cosine of its plane's normal to the surface's
+/// (Lambert, *Photometria*, 1760).
+fn polygon_irradiance(corners: &[DVec3], normal: DVec3) -> f64 {
+    let edges = corners.iter().zip(corners.iter().cycle().skip(1));
+    let mut above: Vec<DVec3> = Vec::with_capacity(corners.len() + 1);
+    for (a, b) in edges {
+        let [from, to] = [a, b].map(|corner| corner.dot(normal));
+        if from > 0.0 {
+            above.push(*a);
+        }
+        if (from > 0.0) != (to > 0.0) {
+            above.push(a.lerp(*b, from / (from - to)));
+        }
+    }
+    let edges = above.iter().zip(above.iter().cycle().skip(1));
+    edges.map(|(a, b)| a.angle_between(*b) * a.cross(*b).normalize_or_zero().dot(normal)).sum::<f64>().abs() / 2.0
 }
 
 impl LightPart {
@@ -318,13 +359,6 @@ mod tests {
         }
     }
 
-    /// A rectangle below which a surface lies: Lambert's formula of a polygon, the sum over its edges of the angle they
-    /// fill times the cosine of their plane's normal to the surface's.
-    fn polygon(corners: &[DVec3], normal: DVec3) -> f64 {
-        let edges = corners.iter().zip(corners.iter().cycle().skip(1));
-        edges.map(|(a, b)| a.angle_between(*b) * a.cross(*b).normalize().dot(normal)).sum::<f64>().abs() / 2.0
-    }
-
     #[test]
     fn a_panel_sends_what_the_closed_form_says() {
         for [x, z] in [[0.5, 0.5], [0.4, 0.3], [2.0, 0.05], [0.05, 2.0]] {
@@ -335,8 +369,9 @@ mod tests {
                 let light = SeenLight::panel(to, f64::hypot(x, z), panel, turned);
                 let corner = |(i, j): (f64, f64)| to + turned * DVec3::new(i * x, 0.0, j * z);
                 let corners = [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)].map(corner);
-                let found = light.irradiance(DVec3::Y);
-                let exact = polygon(&corners, DVec3::Y);
+                let found = light.irradiance_by_parts(DVec3::Y);
+                let exact = polygon_irradiance(&corners, DVec3::Y);
+                assert!((light.irradiance(DVec3::Y) / exact - 1.0).abs() < 1e-9);
                 let error = found / exact - 1.0;
                 assert!(error.abs() < limit, "{x} x {z} at {to}: {found} {exact} {error}");
                 let behind = SeenLight::panel(to, f64::hypot(x, z), panel, DQuat::IDENTITY);
@@ -347,6 +382,23 @@ mod tests {
                     assert!(sheet.irradiance(DVec3::Y) > 0.0 && [0.0, sheet.irradiance(DVec3::Y)].contains(&other));
                 }
             }
+        }
+        // Near by, slanted, and cut by the horizon: against the sum over small patches.
+        for (distance, slant) in [(1.5, 0.0), (0.1, 0.0), (0.1, 0.7), (0.4, 1.4), (0.4, -1.9)] {
+            let normal = DQuat::from_rotation_z(slant) * DVec3::Y;
+            let light = SeenLight::panel(
+                DVec3::new(0.3, distance, 0.1),
+                f64::hypot(0.4, 0.3),
+                LampFace::Sheet(0.75),
+                DQuat::IDENTITY,
+            );
+            let along = |i: i32| (f64::from(i) + 0.5) / 400.0 - 0.5;
+            let patch = |(i, j): (i32, i32)| {
+                let to = DVec3::new(0.3 + 0.8 * along(i), distance, 0.1 + 0.6 * along(j));
+                normal.dot(to).max(0.0) * to.y / to.length_squared().powi(2) * (0.8 * 0.6 / 160_000.0)
+            };
+            let sum: f64 = (0..160_000).map(|k| patch((k % 400, k / 400))).sum();
+            assert!((light.irradiance(normal) / sum - 1.0).abs() < 1e-3, "{distance} {slant}: {light:?} {sum}");
         }
         // A disc that faces the surface on its axis: pi r^2 / (d^2 + r^2).
         for (distance, limit) in [(8.0, 1e-3), (2.0, 5e-3), (0.5, 0.03)] {

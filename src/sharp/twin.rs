@@ -135,6 +135,6 @@ impl SharpTwin<'_> {
             };
             parts.iter().map(part).sum()
         };
-        seen.blocks().into_iter().map(block).sum()
+        seen.over_parts(point.normal) * seen.blocks().into_iter().map(block).sum::<f64>()
     }
 }

@@ -27,6 +27,9 @@ READ_UVEC2(7, SelfCells, self_cells, self_cell)
 layout(std430, binding = 9) readonly buffer ShownLights { uvec4 shown_lights_of[]; }; // of every entity
 layout(std430, binding = 10) writeonly buffer ShownShares { vec4 shown_shares_of[]; }; // of every vertex
 #endif
+#if LAMPS
+layout(std430, binding = 11) writeonly buffer LampShares { float lamp_shares[]; };
+#endif
 
 void main() {
     Cluster cluster = cluster_at(gl_WorkGroupID.x);
@@ -61,6 +64,9 @@ void main() {
     sum.w = pack_marks(is_near, light_states, near_occluders);
 #endif
     radiosity[cluster.radiosity_first + v] = sum;
+#if LAMPS
+    lamp_shares[cluster.radiosity_first + v] = min(lamps, 1.0);
+#endif
 #if SHOWN
     shown_shares_of[cluster.radiosity_first + v] = shown_shares;
 #endif

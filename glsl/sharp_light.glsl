@@ -23,6 +23,10 @@ void note_share(uint light, float irradiance) {
 }
 #endif
 
+#if LAMPS
+float lamps = 0.0; // share of the cosine-weighted view that lamps take, which light that leaves cannot pass
+#endif
+
 #if EDGES
 // Vertices carry a shadow's edge badly where its penumbra is narrow against the distance to the next vertex. The error
 // grows with the square of that distance over the penumbra's width, and with the light that the shadow takes away. They
@@ -467,6 +471,9 @@ vec3 chain_sum(Surface surface, Entity shining, bool open, uint first, uint coun
 #endif
 #if PANELS
     irradiance *= over_parts(surface, light);
+#endif
+#if LAMPS
+    lamps += irradiance / PI;
 #endif
     return irradiance * cone * shining.emission;
 }

@@ -36,7 +36,8 @@ fn baking() -> Vec<ShaderPermutation> {
 fn bouncing() -> Vec<ShaderPermutation> {
     let rows = |texels| {
         [
-            runs_row(texels),
+            runs_row(texels, false),
+            runs_row(texels, true),
             bounce_row(texels, false, true),
             bounce_row(texels, true, false),
             bounce_row(texels, true, true),
@@ -68,6 +69,7 @@ fn sharp() -> Vec<ShaderPermutation> {
             boxes: on(2) != on(4),
             sheets: on(1),
             gloss: on(0),
+            lamps: on(0),
             self_shadows: on(4),
             cones: on(5),
             edges: on(0) == on(2),
@@ -90,6 +92,7 @@ fn drawing() -> Vec<ShaderPermutation> {
         boxes: outlines,
         sheets: outlines,
         gloss: false,
+        lamps: false,
         self_shadows: true,
         cones: outlines,
         edges: true,

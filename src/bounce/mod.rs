@@ -202,6 +202,8 @@ pub struct BouncedLight<'b> {
     pub radiosity: &'b Buffer,
     pub soft_direct: Option<&'b Buffer>,
     pub soft: Option<&'b Buffer>,
+    /// Share of its view that lamps take of every vertex: of the light that leaves it, as much does not get past them.
+    pub lamps: Option<&'b Buffer>,
 }
 
 pub struct Bounce {
@@ -243,7 +245,7 @@ impl Bounce {
         let merge = MergePermutation { variant: merge.variant.restricted(views_hold, true), ..merge };
         let movers = || Movers::new(device, library, (surfaces, far), merge, self_cells.is_some(), ranges.len());
         Ok(Bounce {
-            means: pipeline("runs", runs_row(texels))?,
+            means: pipeline("runs", runs_row(texels, soft))?,
             bounce: pipeline("bounce", bounce_row(texels, soft, meets))?,
             texels,
             runs: Buffer::with_data(device, "runs", &linked.runs)?,
@@ -315,6 +317,7 @@ impl Bounce {
                 Bind::Buffer(&self.areas),
                 read(self.texels, from, quads)?,
                 Bind::Buffer(&self.run_light),
+                light.lamps.map_or(Bind::None, Bind::Buffer),
             ];
             commands.dispatch(&self.means, &resources, &run_count, [run_count, 1, 1])?;
             written(commands);
@@ -359,8 +362,8 @@ fn read<'r>(texels: bool, buffer: &'r Buffer, format: vk::Format) -> Result<Bind
     Ok(if texels { Bind::Texel(TexelView::new(buffer, format)?) } else { Bind::Buffer(buffer) })
 }
 
-pub fn runs_row(texels: bool) -> ShaderPermutation {
-    ShaderPermutation::new("runs.comp", 4).define("TEXEL", texels)
+pub fn runs_row(texels: bool, soft: bool) -> ShaderPermutation {
+    ShaderPermutation::new("runs.comp", 4).define("TEXEL", texels).define("LAMPS", soft)
 }
 
 pub fn bounce_row(texels: bool, soft: bool, movers: bool) -> ShaderPermutation {

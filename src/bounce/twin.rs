@@ -21,6 +21,8 @@ use std::ops::Mul;
 pub struct TwinInput<'t> {
     /// Direct light of every place of the buffers of light.
     pub direct: &'t [DVec3],
+    /// Share of the light that leaves each of them and gets past lamps.
+    pub passes: &'t [f64],
     pub objects: &'t [MergeObject<'t>],
     pub skip: Skip,
     /// Vertex of a cluster.
@@ -45,7 +47,8 @@ impl Bounce {
         let mut light = input.direct.to_vec();
         let mut incoming = vec![(DVec3::ZERO, 0.0); light.len()];
         for step in 0..steps {
-            let of_runs = host.means(&light);
+            let passed: Vec<DVec3> = light.iter().zip(input.passes).map(|(light, share)| *light * *share).collect();
+            let of_runs = host.means(&passed);
             if let Some(movers) = self.movers.as_ref().filter(|_| step == steps.saturating_sub(MET)) {
                 movers.twin(input, &of_runs, steps > 1, &mut incoming)?;
             }

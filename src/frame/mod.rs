@@ -175,7 +175,8 @@ impl Frame {
             .and_then(|entities| Linked::new(&entities, &rigid));
         let self_cells = buffers.has_self_shadows().then_some(&buffers.self_cells);
         let soft = sharp.is_some();
-        let sharp = sharp.map(|fitting| SharpPermutation { edges: pixels.is_some(), ..fitting });
+        let sharp =
+            sharp.map(|fitting| SharpPermutation { edges: pixels.is_some(), lamps: linked.is_some(), ..fitting });
         let picture = FramePicture::new(device, library, &options, PictureLights { pixels, highlights: sharp })?;
         // Shaders take long to compile, so that this is done on all cores.
         let merging = || Merge::new(device, library, permutation);
@@ -313,6 +314,7 @@ impl Frame {
             self_cells: &self.buffers.self_cells,
             soft: self.radiosity.soft_direct(),
             shown: self.kept_for_gloss().map(|[_, lights, shares]| [lights, shares]),
+            lamps: self.radiosity.lamps(),
         }
     }
 

@@ -64,6 +64,7 @@ pub(super) fn sharp(
         self_shadows: buffers.has_self_shadows(),
         cones: lights.len() > 1 || casters > FEW_CASTERS,
         edges: false,
+        lamps: false,
         rolled: false,
     })
 }

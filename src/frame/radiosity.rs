@@ -27,6 +27,8 @@ pub(super) struct RadiosityBuffers {
 struct Direct {
     all: Buffer,
     soft: Option<Buffer>,
+    /// Share of its view that sharp lights take of every vertex, a float each.
+    lamps: Option<Buffer>,
 }
 
 impl RadiosityBuffers {
@@ -61,6 +63,11 @@ impl RadiosityBuffers {
         self.direct = Some(Direct {
             all: like(&self.merged, "direct light")?,
             soft: self.soft.as_ref().map(|soft| like(soft, "soft direct light")).transpose()?,
+            lamps: self
+                .soft
+                .as_ref()
+                .map(|soft| Buffer::zeros(soft.device(), "shares of lamps", soft.size_bytes / 4))
+                .transpose()?,
         });
         Ok(())
     }
@@ -89,6 +96,11 @@ impl RadiosityBuffers {
         }
     }
 
+    /// Where the pass of sharp lights says how much of its view they take of every vertex.
+    pub fn lamps(&self) -> Option<&Buffer> {
+        self.direct.as_ref()?.lamps.as_ref()
+    }
+
     /// What bounces take and give.
     pub fn bounced(&self) -> BouncedLight<'_> {
         BouncedLight {
@@ -96,11 +108,12 @@ impl RadiosityBuffers {
             radiosity: &self.merged,
             soft_direct: self.soft.as_ref().map(|_| self.soft_direct()),
             soft: self.soft.as_ref(),
+            lamps: self.lamps(),
         }
     }
 
     pub fn size_bytes(&self) -> u64 {
-        let direct = self.direct.iter().flat_map(|direct| direct.soft.iter().chain([&direct.all]));
+        let direct = self.direct.iter().flat_map(|of| of.soft.iter().chain(&of.lamps).chain([&of.all]));
         self.merged.size_bytes + self.soft.iter().chain(direct).map(|buffer| buffer.size_bytes).sum::<u64>()
     }
 

@@ -268,7 +268,12 @@ impl Frame {
             }
         };
         let direct = light(self.radiosity.direct())?;
-        let input = TwinInput { direct: &direct, objects: &objects, skip: self.options.skip, vertex: &vertex };
+        let passes = match self.radiosity.lamps() {
+            Some(lamps) => lamps.download::<f32>(direct.len())?.iter().map(|share| 1.0 - f64::from(*share)).collect(),
+            None => vec![1.0; direct.len()],
+        };
+        let input =
+            TwinInput { direct: &direct, passes: &passes, objects: &objects, skip: self.options.skip, vertex: &vertex };
         let wanted = bounce.twin(&input, bounce.steps(self.options.bounces))?;
         Ok(Some([light(&self.radiosity.merged)?, wanted]))
     }

@@ -63,6 +63,8 @@ pub struct SharpPermutation {
     pub self_shadows: bool,
     /// Whether the shares of lights whose highlights are shown are kept.
     pub gloss: bool,
+    /// Whether the share of its view that lamps take is kept of every vertex, for bounces.
+    pub lamps: bool,
     /// Whether every point leaves out the occluders of its lists that stand outside a light's cone. It saves a quarter
     /// of the time or more in scenes of several sharp lights, and costs a fifth under one light.
     pub cones: bool,
@@ -80,7 +82,7 @@ impl SharpPermutation {
 
     /// A fragment shader that evaluates sharp lights. It reads everything through texel views.
     pub fn pixel_row(&self, row: ShaderPermutation, self_shadows: bool) -> ShaderPermutation {
-        SharpPermutation { reads: Reads::Texels, self_shadows, edges: false, gloss: false, ..*self }
+        SharpPermutation { reads: Reads::Texels, self_shadows, edges: false, gloss: false, lamps: false, ..*self }
             .shared(row)
             .define("WORKGROUP", CLUSTER_VERTICES)
     }
@@ -101,6 +103,7 @@ impl SharpPermutation {
             .define("CONES", self.cones)
             .define("EDGES", self.edges)
             .define("SHOWN", self.gloss)
+            .define("LAMPS", self.lamps)
             .define("ROLLED", self.rolled)
             .define("NODE_CELLS", self.silhouette.cells)
             .define("MAP", self.silhouette.map_px);
@@ -177,6 +180,8 @@ pub struct SharpInputs<'b> {
     /// For every entity the lights whose highlights it shows, and where their shares at all vertices go, in the
     /// permutation that keeps them.
     pub shown: Option<[&'b Buffer; 2]>,
+    /// Where the shares go that lamps take of the view of all vertices, in the permutation that keeps them.
+    pub lamps: Option<&'b Buffer>,
 }
 
 pub struct Sharp {
@@ -215,6 +220,7 @@ impl Sharp {
             read(inputs.soft, quads)?,
             inputs.shown.map_or(Bind::None, |[lights, _]| Bind::Buffer(lights)),
             inputs.shown.map_or(Bind::None, |[_, shares]| Bind::Buffer(shares)),
+            inputs.lamps.map_or(Bind::None, Bind::Buffer),
         ];
         commands.dispatch(&self.pipeline, &resources, &(), [cluster_count * CLUSTER_VERTICES, 1, 1])
     }

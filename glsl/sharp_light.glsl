@@ -140,7 +140,8 @@ vec4 let_through(Entity occluder, Surface surface, SeenLight light, Block block,
     rays.middle = along_axes(light, block.middle);
     uint first = occluder.silhouette, field = first & ~HAS_HALVES;
     NodeCell cell = node_cell(field, rays.axes * rays.middle);
-    vec2 in_box = through_box(field, rays.axes * rays.place, rays.axes * rays.middle);
+    vec3 place = rays.axes * rays.place;
+    vec2 in_box[4];
     vec4 weights[4];
     vec4 limit, tangent;
     EACH for (uint k = 0; k < 4; k++) {
@@ -148,7 +149,9 @@ vec4 let_through(Entity occluder, Surface surface, SeenLight light, Block block,
         rays.along[k] = along_axes(light, part);
         rays.offset[k] = dot(rays.place, rays.along[k]);
         rays.foot[k] = rays.place - rays.offset[k] * rays.along[k];
-        weights[k] = node_weights(cell, rays.axes * rays.along[k]);
+        vec3 direction = rays.axes * rays.along[k];
+        weights[k] = node_weights(cell, direction);
+        in_box[k] = through_box(field, place, direction);
         limit[k] = before ? reach_of(light, part, rays.along[k]) * occluder.centre.w : EVERYTHING;
         float sine = part_sine(light, block, part, rays.along[k]);
         tangent[k] = sine * inversesqrt(1.0 - sine * sine);
@@ -177,7 +180,7 @@ vec4 let_through(Entity occluder, Surface surface, SeenLight light, Block block,
         outlines(rays, cell, weights, side, distance, away);
         EACH for (uint k = 0; k < 4; k++) {
             blocks[k] = share_blocked(distance[k], away[k], tangent[k]);
-            stands[k] = counts_between(away[k], limit[k], in_box);
+            stands[k] = counts_between(away[k], limit[k], in_box[k]);
 #if EDGES
             if (before && (side == WHOLE || inside[k] > 0.0)) {
                 float penumbra = max(away[k], NEAREST) * max(tangent[k], LEAST_PENUMBRA);
@@ -286,14 +289,16 @@ float rectangle_light(SeenLight light, vec3 normal) {
     return abs(sum + edge_light(leaves, enters, normal));
 }
 
-// Light that a rectangle sends where nothing is between, over that of its parts, which are coarse near by.
+// Light that a rectangle which is not thin sends where nothing is between, over that of its parts, which are coarse near
+// by. Of a far one f32 leaves little.
 float over_parts(Surface surface, SeenLight light) {
     mat3 axes = mat3(light.toward, light.across, light.down);
     float sum = 0.0;
     EACH for (uint i = 0; i < FACINGS; i++) {
         sum += surface.facings[i].weight * rectangle_light(light, surface.facings[i].normal * axes);
     }
-    return is_rectangle(light) && open_share > 0.0 ? sum / open_share : 1.0;
+    bool exact = is_rectangle(light) && light.ratio * THIN > 1.0 && light.ratio < THIN;
+    return exact && open_share > 0.0 ? mix(1.0, sum / open_share, light.fine) : 1.0;
 }
 #endif
 

@@ -11,7 +11,9 @@
 
 use super::packet::{BlockerHit, Blockers};
 use crate::field::quantity::channel_stride;
-use crate::field::self_visibility::{BYTES, LIMIT_RAD, NODES, encode_angle, encode_distance, frame, node_direction};
+use crate::field::self_visibility::{
+    BYTES, LIMIT_RAD, NODES, encode_angle, encode_distance, frame, node_direction, octahedral,
+};
 use crate::sh::basis::{MAX_BANDS, MAX_COEFFICIENTS, coefficient_count, evaluate};
 use crate::sh::lobe::clamped_cosine;
 use crate::sh::rotation::Rotation;
@@ -467,11 +469,11 @@ impl CellHits {
         for (node, &toward) in nodes.iter().enumerate() {
             let nearest = nearest_to(toward, &edges);
             let angle = nearest.map_or(LIMIT_RAD, |nearest| close.angle_to_edge(toward, nearest, &edges));
-            let nearest = nearest.map(|nearest| edges[nearest]);
+            let edge = nearest.map(|nearest| edges[nearest]);
             let free = here[node].is_infinite();
             map[node] = encode_angle(if free { angle } else { -angle });
-            let away = if free { nearest.map_or(f32::INFINITY, |(_, away)| away) } else { here[node] };
-            map[NODES + node] = encode_distance(f64::from(away) / standing.radius);
+            let (way, away) = if free { edge.unwrap_or((toward, f32::INFINITY)) } else { (toward, here[node]) };
+            map[NODES + node] = encode_distance(f64::from(away) * octahedral(way.as_dvec3()) / standing.radius);
         }
         map
     }
@@ -627,6 +629,7 @@ mod tests {
         assert!(worst[0] < 2.0 && worst[1] < 4.0, "{worst:?} degrees");
         let nearest = (0..NODES).min_by(|a, b| node_direction(*b).z.total_cmp(&node_direction(*a).z)).unwrap();
         let distance = crate::field::self_visibility::decode_distance(map[NODES + nearest]).exp2();
+        let distance = distance / octahedral(node_direction(nearest));
         assert!((0.95..1.15).contains(&distance), "{distance}");
     }
 

@@ -107,9 +107,6 @@ pub struct Near {
     point: DVec3,
     cell: Cell,
     maps: [NearMap; 4],
-    /// Where the ray in the middle of those directions enters and leaves the box around the object, as
-    /// [`SilhouetteField::through_box`].
-    in_box: [f64; 2],
 }
 
 /// One of the four maps around a direction, as it concerns rays through one point.
@@ -289,7 +286,7 @@ impl SilhouetteField {
             near.depth = self.depth(&near, Side::Whole);
             near
         });
-        Near { point, cell, maps, in_box: self.through_box(point, toward) }
+        Near { point, cell, maps }
     }
 
     /// Depth along the direction of the nearest point of a side's outline.
@@ -339,12 +336,13 @@ impl SilhouetteField {
     /// radius.
     pub fn blocked(&self, near: &Near, direction: DVec3, distance: f64, tangent: f64) -> f64 {
         let along = near.point.dot(direction);
+        let in_box = self.through_box(near.point, direction);
         // Share that an outline blocks, and how far it counts.
         let by = |side: Side| {
             let outline = self.outline(near, side, direction);
             let away = outline.depth - along;
             let share = blocked_share(outline.distance / (away.max(NEAREST) * tangent).max(LEAST_PENUMBRA));
-            (share, counts_between(away, distance, near.in_box))
+            (share, counts_between(away, distance, in_box))
         };
         let (whole, counts) = by(Side::Whole);
         let nearest = near.point.length().min((near.point + distance.min(1e30) * direction).length());

@@ -14,7 +14,7 @@ use crate::field::lattice::CELL_WARP;
 use crate::field::sheet::{BEYOND as BEYOND_SHEET, CONTACT};
 use crate::field::silhouette::{DEEP, INSIDE, LEAST_PENUMBRA, LEAST_STEP, NEAREST, NO_BOX, REACH, TOUCHING};
 use crate::field::silhouette_nodes::{BEYOND, EASED, LEAST_AHEAD};
-use crate::field::sub_light::{BLEND, CORNER, LIMIT_SINE, MOST_SINE, NEAR_LIGHT_STEPS, STRIP, TURNED_BY};
+use crate::field::sub_light::{BLEND, CORNER, LIMIT_SINE, MOST_SINE, NEAR_LIGHT_STEPS, STRIP, THIN, TURNED_BY};
 use crate::gpu::{Bind, Buffer, Commands, ComputePipeline, Device, TexelView};
 use crate::layout::{CLUSTER_FORMAT, CLUSTER_VERTICES, ENTRY_BITS, ENTRY_FORMAT};
 use crate::merge::variant::Reads;
@@ -131,6 +131,7 @@ impl SharpPermutation {
             ("BLEND", BLEND),
             ("CORNER", CORNER),
             ("STRIP", STRIP),
+            ("THIN", THIN),
             ("BEYOND", BEYOND),
             ("EASED", EASED),
             ("LEAST_AHEAD", LEAST_AHEAD),

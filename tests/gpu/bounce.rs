@@ -158,6 +158,48 @@ fn what_moves_and_what_rests_light_each_other() {
     }
 }
 
+/// Light that a panel throws on the ceiling right above it does not pass through the panel, whether that moves or not.
+#[test]
+fn a_panel_below_a_ceiling_hides_what_it_lights() {
+    let Some(stage) = stage() else { return };
+    for motion in ["", "motion = [{ spin = { period_s = 9 } }], "] {
+        let text = format!(
+            r#"
+            camera = {{ eye = [0, 1, 4], target = [0, 1, 0] }}
+            mesh = [
+                {{ name = "slab", cuboid = {{ size_m = [3, 0.1, 3], cells = 48 }} }},
+                {{ name = "panel", plane = {{ size_m = 0.8, cells = 1 }} }},
+            ]
+            entity = [
+                {{ mesh = "slab", position = [0, -0.05, 0], albedo = [0.7, 0.7, 0.7] }},
+                {{ mesh = "slab", position = [0, 2.05, 0], albedo = [0.8, 0.8, 0.8] }},
+                {{ mesh = "panel", {motion}position = [0, 1.96, 0], emission = [10, 8, 6], receives = false }},
+            ]
+            "#
+        );
+        let scene = Scene::parse(&text, Path::new("panel.toml"), &embedded::read).unwrap();
+        let placements = scene.at(0.0);
+        let shapes = RayMeshes::new(&scene);
+        let world = World::new(&scene, &shapes, &placements);
+        let floor = receiver_vertices(&scene).into_iter().filter(|v| v.entity == 0);
+        let floor: Vec<Vertex> = floor.filter(|v| scene.meshes[0].normals[v.index].y > 0.5).step_by(13).collect();
+        let rays = |bounces| {
+            let estimates = RayCast { rays: 1024, bounces, ..RayCast::default() }.run(&world, &floor);
+            estimates.into_iter().flat_map(|estimate| estimate.radiosity).sum::<f64>()
+        };
+        let sum = |bounces| {
+            let mut frame = stage.frame(&scene, usual(bounces));
+            let found = stage.light(&mut frame, &placements);
+            floor.iter().flat_map(|v| found[v.entity][v.index]).map(f64::from).sum::<f64>()
+        };
+        let [direct, all] = [0, 1].map(rays);
+        let found = sum(Bounces::One);
+        // Lit through the panel the floor would have half as much again.
+        let error = found / all - 1.0;
+        assert!(error.abs() < 0.03 && direct < 0.95 * all, "{error}: {found} for {direct} and {all}: {motion}");
+    }
+}
+
 /// Nothing jumps where what a thing sees of the floor is cut otherwise: ten times smaller steps
 /// change light ten times less. (Steps of a millimetre: 0.012 of the brightest, under the ball.)
 #[test]

@@ -52,6 +52,9 @@ struct Facing {
     uint self_first;  // first cell of its self-visibility, or NONE
     bool counts;      // whether its self-visibility goes with the list of occluders
     mat3 self_frame;  // about the normal, world
+#if FACINGS > 1
+    vec3 aside;       // of the vertex from the surface's point, world axes, metres
+#endif
 #endif
 };
 
@@ -213,7 +216,7 @@ vec4 part_shares(Surface surface, SeenLight light, Block block) {
         vec3 along = along_axes(light, part);
         vec3 direction = axes * along;
         float sine = part_sine(light, block, part, along);
-        float reach = reach_of(light, part, along) * surface.inverse_radius;
+        float reach = reach_of(light, part, along);
         float sum = 0.0;
 #if SELF && FACINGS > 1
         vec2 counted = vec2(0.0); // of the facings that count: past their self-visibility, and without
@@ -230,7 +233,14 @@ vec4 part_shares(Surface surface, SeenLight light, Block block) {
 #if SELF
             // A part's radius is small enough for its sine to stand for it.
             bool shadows = facing.self_first != NONE;
-            float sees = self_visible(shadows ? facing.self_first : 0, facing.self_frame, direction, sine, reach);
+            vec3 to_part = reach * direction;
+#if FACINGS > 1
+            // A map holds for its vertex: there a wall beside the lamp is as far away as it says.
+            to_part -= facing.aside;
+#endif
+            float far = length(to_part);
+            float sees = self_visible(shadows ? facing.self_first : 0, facing.self_frame, to_part / max(far, 1e-30), sine,
+                                      far * surface.inverse_radius);
 #if FACINGS > 1
             counted += facing.counts ? facing.weight * cosine * vec2(shadows ? sees : 1.0, 1.0) : vec2(0.0);
 #else
@@ -246,7 +256,7 @@ vec4 part_shares(Surface surface, SeenLight light, Block block) {
         float unit = block.weight * part_light(light, block, part, along);
         share[k] = unit * sum;
 #if EDGES
-        float steps = surface.step * surface.inverse_radius / max(reach, 1e-30);
+        float steps = surface.step / max(reach, 1e-30);
         curved += share[k] * min(steps * steps, 1.0);
 #endif
 #if SHOWN || PANELS

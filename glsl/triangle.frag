@@ -47,9 +47,11 @@ void main() {
         Entity receiver = ENTITY(push.receiver);
         Facing facings[FACINGS];
         [[unroll]] for (uint i = 0; i < FACINGS; i++) {
-            vec3 normal = texelFetch(vertices, int(2 * (push.vertex_first + triangle[i]) + 1)).xyz;
+            int vertex = int(2 * (push.vertex_first + triangle[i]));
+            vec3 normal = texelFetch(vertices, vertex + 1).xyz;
             facings[i] = facing_of(receiver, normal, weight[i], push.self_first, triangle[i]);
 #if SELF
+            facings[i].aside = receiver.scale * to_world(receiver, texelFetch(vertices, vertex).xyz - within * at);
             facings[i].counts = !own_maps || triangle[i] / WORKGROUP == nearest / WORKGROUP;
 #endif
         }

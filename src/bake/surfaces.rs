@@ -27,7 +27,7 @@ use std::sync::{Arc, OnceLock};
 use std::time::Instant;
 
 /// Counts in every name of the cache: another number where a bake of surfaces computes something else.
-const VERSION: u32 = 14;
+const VERSION: u32 = 15;
 /// How far towards the middle of its triangles a vertex is seen from, as a share of the way: the light of a crease is
 /// that just inside each face. Where meshes are left as they are, so are the places from which they are seen.
 const NUDGE: f32 = 0.02;
@@ -439,19 +439,18 @@ impl GroupSpace<'_> {
     }
 
     /// The members that are so near a cluster, given by its vertices, that its maps have their shadows.
-    fn near(&self, positions: impl Iterator<Item = Vec3> + Clone) -> Vec<u32> {
+    fn near(&self, positions: impl Iterator<Item = Vec3>) -> Vec<u32> {
         let group = self.group;
         let place = |p: Vec3| (self.own().placement.point(p.as_dvec3()) - group.centre) / group.radius_m;
-        let count = positions.clone().count().max(1) as f64;
-        let centre = positions.clone().map(place).sum::<DVec3>() / count;
-        let radius = positions.map(|p| place(p).distance(centre)).fold(0.0, f64::max);
+        let places: Vec<DVec3> = positions.map(place).collect();
         let is_near = |member: &usize| {
             let (middle, reach) = group.spheres[*member];
             let of = &group.plan.members[*member];
             // Outlines of these hold at every distance.
             let keeps_outline =
                 of.emits || (of.mask.is_none() && (of.mesh.rectangle().is_some() || of.mesh.is_convex()));
-            *member == self.member || (of.occludes && !keeps_outline && middle.distance(centre) - radius < FAR * reach)
+            let comes_near = || places.iter().any(|place| place.distance(middle) < FAR * reach);
+            *member == self.member || (of.occludes && !keeps_outline && comes_near())
         };
         (0..group.spheres.len()).filter(is_near).map(|member| member as u32).collect()
     }

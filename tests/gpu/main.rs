@@ -11,6 +11,7 @@ mod field;
 mod flight;
 mod gloss;
 mod hidden;
+mod lamps;
 mod layouts;
 mod light;
 mod merge;

@@ -1,0 +1,108 @@
+//! Rooms that people build and their lamps: pictures beside rays.
+
+use super::common::{generate, relative_rms};
+use super::stage::{Stage, stage};
+use glam::Vec3;
+use shadow_fields::asset::Mesh;
+use shadow_fields::asset::generate::Generator;
+use shadow_fields::bake;
+use shadow_fields::bounce::Bounces;
+use shadow_fields::frame;
+use shadow_fields::scene::data::EntityData;
+use shadow_fields::scene::motion::RotationData;
+use shadow_fields::scene::{Camera, Scene};
+use shadow_fields::truth::pixels;
+use shadow_fields::truth::ray_mesh::RayMeshes;
+use shadow_fields::truth::raycast::RayCast;
+use shadow_fields::truth::world::World;
+use std::f32::consts::TAU;
+
+fn turned(axis: Vec3, angle_deg: f64) -> RotationData {
+    RotationData::AxisAngle { axis, angle_deg }
+}
+
+/// Relative RMS of a scene's picture against rays through its pixels, direct light alone.
+fn picture_error(stage: &Stage, scene: &Scene) -> f64 {
+    let size = [96, 64];
+    let bake = bake::Options { groups: true, vertices: 20_000, ..bake::Options::default() };
+    let options = frame::Options { size, bake, bounces: Bounces::None, ..frame::Options::default() };
+    let placements = scene.at(0.0);
+    let mut frame = stage.frame(scene, options);
+    frame.render(&placements, Some(f32::INFINITY)).unwrap();
+    let shapes = RayMeshes::new(scene);
+    let world = World::new(scene, &shapes, &placements);
+    let rays = pixels::picture(&world, size, true, &RayCast { rays: 512, runs: 2, ..RayCast::default() }, &|_| ());
+    // The lamp itself is brighter than all that it lights.
+    let pairs = frame.picture().into_iter().zip(rays.linear).map(|(found, truth)| (f64::from(found), f64::from(truth)));
+    relative_rms(pairs.filter(|(found, truth)| found.max(*truth) < 0.6))
+}
+
+/// A room is one mesh, a lamp hangs a centimetre below its ceiling, and its walls are lit at few vertices: nothing that
+/// is behind the lamp hides it, as seen from a vertex or from between vertices.
+#[test]
+fn a_room_of_one_mesh_is_lit_by_its_ceiling_lamp() {
+    let Some(stage) = stage() else { return };
+    let solid = generate::cuboid(Vec3::splat(2.0), 1);
+    let is_front = |t: &[u32; 3]| t.iter().all(|&v| solid.normals[v as usize].z > 0.5);
+    let open = solid.triangles.iter().filter(|triangle| !is_front(triangle));
+    let inwards = open.map(|[a, b, c]| [*a, *c, *b]).collect();
+    let normals = solid.normals.iter().map(|normal| -*normal).collect();
+    let room = Mesh::new("room", solid.positions.clone(), normals, None, inwards).unwrap();
+    let scene = Scene::builder()
+        .camera(Camera::new([0.0, 0.0, 4.0], [0.0; 3]))
+        .mesh("room", room)
+        .mesh("box", generate::cuboid(Vec3::new(0.6, 1.2, 0.6), 1))
+        .mesh("lamp", Generator::Rectangle { size_m: [0.6, 0.5] })
+        .entity(EntityData { albedo: Vec3::splat(0.7).into(), ..EntityData::of_mesh("room") })
+        .entity(EntityData {
+            position: Vec3::new(-0.35, -0.4, -0.3),
+            rotation: turned(Vec3::Y, 17.0),
+            ..EntityData::of_mesh("box")
+        })
+        .entity(EntityData {
+            position: Vec3::new(0.0, 0.99, 0.0),
+            rotation: turned(Vec3::X, 180.0),
+            emission: Vec3::splat(10.0),
+            ..EntityData::of_mesh("lamp")
+        });
+    let error = picture_error(&stage, &scene.build().unwrap());
+    assert!(error < 0.12, "{error}");
+}
+
+/// A bulb within a shade lights what lies below, and nothing beside it.
+#[test]
+fn no_light_comes_through_a_lamp_shade() {
+    let Some(stage) = stage() else { return };
+    let profile = [[0.28, -0.15], [0.16, 0.15], [0.15, 0.15], [0.27, -0.15]];
+    let sides = 24_u32;
+    let place = |i: u32| {
+        let [radius, y] = profile[i as usize % 4];
+        let (sine, cosine) = (TAU * (i / 4) as f32 / sides as f32).sin_cos();
+        Vec3::new(radius * cosine, y, radius * sine)
+    };
+    let mut corners = Vec::new();
+    for i in 0..4 * sides {
+        let next = i / 4 * 4 + (i + 1) % 4;
+        corners.extend([i, next, next + 4, i + 4].map(|i| place(i % (4 * sides))));
+    }
+    let triangles =
+        (0..4 * sides).flat_map(|i| [[4 * i, 4 * i + 1, 4 * i + 2], [4 * i, 4 * i + 2, 4 * i + 3]]).collect();
+    let shade = Mesh::new("shade", corners, Vec::new(), None, triangles).unwrap();
+    let slab =
+        |position: Vec3, rotation: RotationData| EntityData { position, rotation, ..EntityData::of_mesh("slab") };
+    let scene = Scene::builder()
+        .camera(Camera::new([0.2, 1.1, 2.6], [0.0, 0.4, 0.0]))
+        .mesh("slab", generate::cuboid(Vec3::new(4.0, 0.1, 4.0), 1))
+        .mesh("shade", shade)
+        .mesh("bulb", Generator::Sphere { radius_m: 0.04, subdivisions: 2 })
+        .entity(slab(Vec3::new(0.0, -0.05, 0.0), RotationData::default()))
+        .entity(slab(Vec3::new(0.0, 1.9, -1.0), turned(Vec3::X, 90.0)))
+        .entity(EntityData { position: Vec3::new(0.0, 0.65, 0.0), ..EntityData::of_mesh("shade") })
+        .entity(EntityData {
+            position: Vec3::new(0.0, 0.62, 0.0),
+            emission: Vec3::splat(150.0),
+            ..EntityData::of_mesh("bulb")
+        });
+    let error = picture_error(&stage, &scene.build().unwrap());
+    assert!(error < 0.08, "{error}");
+}

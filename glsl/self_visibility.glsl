@@ -40,8 +40,8 @@ vec2 self_lookup(uint first_cell, vec3 local) {
     return vec2(found.x * (SELF_LIMIT / 127.0), SELF_FIRST - log2(found.y));
 }
 
-// Share of a round light in a unit direction, of angular radius `radius` (radians), `distance` away (in r), that the mesh leaves free;
-// `first_cell` is the vertex's first.
+// Share of a round light that the mesh leaves free: in a unit direction, of angular radius `radius` (radians),
+// `distance` away (in r). `first_cell` is the vertex's first.
 float self_visible(uint first_cell, mat3 frame, vec3 direction, float radius, float distance) {
     vec3 local = direction * frame;
     vec2 found = self_lookup(first_cell, local);

@@ -233,13 +233,15 @@ vec4 part_shares(Surface surface, SeenLight light, Block block) {
 #if SELF
             // A part's radius is small enough for its sine to stand for it.
             bool shadows = facing.self_first != NONE;
-            vec3 to_part = reach * direction;
+            vec3 toward = direction;
+            float far = reach;
 #if FACINGS > 1
             // A map holds for its vertex: there a wall beside the lamp is as far away as it says.
-            to_part -= facing.aside;
+            toward = reach * direction - facing.aside;
+            far = length(toward);
+            toward /= max(far, 1e-30);
 #endif
-            float far = length(to_part);
-            float sees = self_visible(shadows ? facing.self_first : 0, facing.self_frame, to_part / max(far, 1e-30), sine,
+            float sees = self_visible(shadows ? facing.self_first : 0, facing.self_frame, toward, sine,
                                       far * surface.inverse_radius);
 #if FACINGS > 1
             counted += facing.counts ? facing.weight * cosine * vec2(shadows ? sees : 1.0, 1.0) : vec2(0.0);

@@ -2,7 +2,7 @@
 
 use super::common::{generate, relative_rms};
 use super::stage::{Stage, stage};
-use glam::Vec3;
+use glam::{Vec2, Vec3};
 use shadow_fields::asset::Mesh;
 use shadow_fields::asset::generate::Generator;
 use shadow_fields::bake;
@@ -77,8 +77,8 @@ fn no_light_comes_through_a_lamp_shade() {
     let sides = 24_u32;
     let place = |i: u32| {
         let [radius, y] = profile[i as usize % 4];
-        let (sine, cosine) = (TAU * (i / 4) as f32 / sides as f32).sin_cos();
-        Vec3::new(radius * cosine, y, radius * sine)
+        let around = radius * Vec2::from_angle(TAU * (i / 4) as f32 / sides as f32);
+        Vec3::new(around.x, y, around.y)
     };
     let mut corners = Vec::new();
     for i in 0..4 * sides {

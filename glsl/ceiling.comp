@@ -18,14 +18,17 @@ layout(std430, binding = 0) readonly buffer Source { uvec2 source[]; };
 
 void main() {
     uint index = gl_GlobalInvocationID.x;
-    // Sixteen independent results, so that latency is hidden.
-    vec4 sums[4] = vec4[](vec4(index), vec4(0.25), vec4(0.5), vec4(0.75));
+    // Sixteen independent results, so that latency is hidden; none of them is equal to another or known when compiled, so that
+    // each is computed.
+    vec4 start = vec4(index, index + 1, index + 2, index + 3);
+    vec4 sums[4] = vec4[](start, 0.25 * start, 0.5 * start, 0.75 * start);
+    vec4 factor = 1.0 / (2.0 + start);
     uint at = index * 747796405u;
     uint round = 0;
     do {
 #if KIND == 0
         [[unroll]] for (uint k = 0; k < READS; k++) {
-            sums[k % 4] = sums[k % 4] * 0.999 + 0.001;
+            sums[k % 4] = sums[k % 4] * factor + start;
         }
 #else
         // Runs of four texels at scattered addresses, as in a lookup's corners.

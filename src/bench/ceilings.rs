@@ -33,40 +33,51 @@ impl Ceilings {
 const RUNS: usize = 5;
 /// Vector multiply-adds, or reads, per iteration.
 const READS: u32 = 16;
-/// Invocations of the arithmetic, the most of any kind: each writes 16 bytes.
-const ARITHMETIC_INVOCATIONS: u32 = 65_536;
+/// Invocations of the shortest run, and the most of any: each writes 16 bytes.
+const INVOCATIONS: [u32; 2] = [1 << 14, 1 << 22];
+/// Least time of a run in those of an idle dispatch, so that the work is measured and not its start.
+const LEAST: f64 = 100.0;
 
 /// Measures a device with reads from a buffer of `field_bytes`.
 pub fn measure(device: &Arc<Device>, library: &Library, field_bytes: u64) -> Result<Ceilings> {
     let source = Buffer::with_data(device, "ceiling source", &vec![0x2000_2000_u32; field_bytes as usize / 4])?;
-    let out = Buffer::new(device, "ceiling results", BufferKind::Device, 16 * u64::from(ARITHMETIC_INVOCATIONS))?;
-    let seconds = |kind: u32, invocations: u32, rounds: u32, texel_bytes: u64| -> Result<f64> {
+    let out = Buffer::new(device, "ceiling results", BufferKind::Device, 16 * u64::from(INVOCATIONS[1]))?;
+    let pipeline = |kind: u32, rounds: u32, texel_bytes: u64| -> Result<ComputePipeline> {
         let texels = (field_bytes / texel_bytes).max(8);
         let row = ShaderPermutation::new("ceiling.comp", 4)
             .define("KIND", kind)
             .define("READS", READS)
             .define("ROUNDS", rounds)
             .define("MASK", (1_u32 << texels.ilog2()) - 1);
-        let pipeline = ComputePipeline::new(device, "ceiling", &library.shader(&row)?)?;
+        ComputePipeline::new(device, "ceiling", &library.shader(&row)?)
+    };
+    let seconds = |kind: u32, pipeline: &ComputePipeline, invocations: u32| -> Result<f64> {
         let first = match kind {
             1 => Bind::Texel(TexelView::new(&source, vk::Format::R16G16B16A16_SFLOAT)?),
             2 => Bind::Texel(TexelView::new(&source, vk::Format::R32G32B32A32_UINT)?),
             _ => Bind::Buffer(&source),
         };
-        best(device, &pipeline, &[first, Bind::Buffer(&out)], invocations)
+        best(device, pipeline, &[first, Bind::Buffer(&out)], invocations)
     };
-    let rate = |kind: u32, invocations: u32, rounds: u32, texel_bytes: u64| -> Result<f64> {
-        let reads = f64::from(invocations) * f64::from(rounds) * f64::from(READS);
-        Ok(1e-9 * reads / seconds(kind, invocations, rounds, texel_bytes)?)
+    let idle = seconds(0, &pipeline(0, 1, 8)?, 1)?;
+    let rate = |kind: u32, rounds: u32, texel_bytes: u64| -> Result<f64> {
+        let pipeline = pipeline(kind, rounds, texel_bytes)?;
+        let mut invocations = INVOCATIONS[0];
+        let mut time = seconds(kind, &pipeline, invocations)?;
+        while time < LEAST * idle && invocations < INVOCATIONS[1] {
+            invocations *= 4;
+            time = seconds(kind, &pipeline, invocations)?;
+        }
+        Ok(1e-9 * f64::from(invocations) * f64::from(rounds) * f64::from(READS) / time)
     };
-    // Invocations differ by kind, because some kinds are slow on a CPU.
+    // Rounds differ by kind, because some kinds are slow on a CPU.
     Ok(Ceilings {
         // An iteration multiplies and adds vectors of four.
-        gflops: 8.0 * rate(0, ARITHMETIC_INVOCATIONS, 256, 8)?,
-        texel_halves_giga: rate(1, 16_384, 64, 8)?,
-        texel_packed_giga: rate(2, 16_384, 64, 16)?,
-        storage_giga: rate(3, 16_384, 16, 8)?,
-        dispatch_ms: 1e3 * seconds(0, 1, 1, 8)?,
+        gflops: 8.0 * rate(0, 256, 8)?,
+        texel_halves_giga: rate(1, 64, 8)?,
+        texel_packed_giga: rate(2, 64, 16)?,
+        storage_giga: rate(3, 16, 8)?,
+        dispatch_ms: 1e3 * idle,
     })
 }
 

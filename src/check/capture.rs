@@ -11,7 +11,7 @@ use crate::field::FieldKind;
 use crate::gpu::{Access, Buffer, BufferKind, Commands, Device};
 use crate::sh::cube::FACE_COUNT;
 use bytemuck::Pod;
-use glam::Vec3;
+use glam::{DVec3, Vec3};
 use std::sync::Arc;
 
 /// Share of texels whose centres may lie so near an edge that device and rays disagree: 1e-3 where corners snap to
@@ -156,9 +156,11 @@ pub fn coverage(baker: &Baker, mesh: &Mesh, eyes: &[Vec3], face_px: u32, way: Wa
     Ok(out)
 }
 
-/// Share of the texels whose captured colour is farther than a few roundings from that of the nearest thing that a ray
-/// meets. Infinite where nothing was seen.
+/// Share of the texels whose captured colour is farther from that of the nearest thing that a ray meets than a few
+/// roundings and a snapped corner explain: some devices interpolate between corners where they were, others between
+/// corners where they snapped to. Infinite where nothing was seen.
 pub fn colors(baker: &Baker, mesh: &Mesh, eyes: &[Vec3], face_px: u32) -> Result<f64> {
+    let step = snapping(baker.device()) / 256.0;
     let positions = unit_positions(mesh);
     let white = vec![Vec3::ONE; positions.len()];
     let colors = mesh.colors.as_ref().unwrap_or(&white);
@@ -169,12 +171,13 @@ pub fn colors(baker: &Baker, mesh: &Mesh, eyes: &[Vec3], face_px: u32) -> Result
         eyes.iter().zip(faces::<[f32; 4]>(baker, mesh, eyes, (face_px, FieldKind::Radiance, true), Way::Drawn)?)
     {
         for (face, found) in faces.iter().enumerate() {
-            let wanted = capture::twin_colors(&positions, colors, &mesh.triangles, eye.as_dvec3(), face, face_px);
-            for (i, wanted) in wanted.iter().enumerate() {
+            let expected = capture::twin_colors(&positions, colors, &mesh.triangles, eye.as_dvec3(), face, face_px);
+            for (i, wanted) in expected.iter().enumerate() {
                 let found = found.as_ref().map_or([0.0; 3], |texels| [texels[i][0], texels[i][1], texels[i][2]]);
                 let found = Vec3::from_array(found).as_dvec3();
+                let snapped = step * largest_difference(&expected, i, face_px as usize);
                 // Written so that what is no number differs.
-                let agrees = (found - *wanted).length() <= COLOR * (1.0 + wanted.length());
+                let agrees = (found - *wanted).length() <= COLOR * (1.0 + wanted.length()) + snapped;
                 differing += usize::from(!agrees);
                 lit += usize::from(wanted.length() > 0.0);
                 texels += 1;
@@ -182,6 +185,18 @@ pub fn colors(baker: &Baker, mesh: &Mesh, eyes: &[Vec3], face_px: u32) -> Result
         }
     }
     Ok(if lit == 0 { f64::INFINITY } else { f64::from(differing as u32) / texels as f64 })
+}
+
+/// The largest difference between the colour of a texel and those of its neighbours in its row and column.
+fn largest_difference(colors: &[DVec3], texel: usize, width: usize) -> f64 {
+    let x = texel % width;
+    let sides = [
+        (x > 0).then(|| texel - 1),
+        (x + 1 < width).then(|| texel + 1),
+        texel.checked_sub(width),
+        (texel + width < colors.len()).then(|| texel + width),
+    ];
+    sides.into_iter().flatten().map(|side| (colors[side] - colors[texel]).length()).fold(0.0, f64::max)
 }
 
 /// Eyes all around: on the axes, at odd angles, near and far.

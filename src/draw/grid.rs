@@ -136,7 +136,9 @@ impl DrawGrid {
         made_once(&self.made[usize::from(sharp.is_some())], || match sharp {
             None => self.maker.make("draw grid", &[vertex, fragment], state),
             Some(_) => {
-                let nearer = GraphicsState { nearer_steps: NEARER_STEPS, ..state };
+                // Corners of the grid and of its patches each snap by up to half of a step along both axes.
+                let snapped_px = (1.0 - self.maker.device.limits.sub_pixel_precision_bits as f32).exp2();
+                let nearer = GraphicsState { nearer_steps: NEARER_STEPS, nearer_px: snapped_px, ..state };
                 let vertex = vertex.define("BLOCK_CELLS", BLOCK_CELLS);
                 self.maker.make("draw grid pixels", &[vertex, fragment], nearer)
             }

@@ -15,6 +15,7 @@ layout(binding = 1) uniform textureBuffer vertices;
 #include "gloss_vertex.glsl"
 #endif
 layout(location = 0) out vec4 radiance; // w: 1
+invariant gl_Position; // what is drawn again by another pipeline lies at the same depth
 
 layout(push_constant) uniform Push {
     mat4 clip_from_object;

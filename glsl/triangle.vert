@@ -4,6 +4,7 @@ layout(location = 0) out vec3 at;      // object's frame, metres
 layout(location = 1) out vec3 weights; // of the triangle's three vertices
 layout(location = 2) flat out uvec3 triangle;
 layout(location = 3) out vec3 emission;
+invariant gl_Position; // the triangle lies at the depth at which it was drawn before
 #if PAINTED
 layout(location = 4) out vec2 uv;
 layout(location = 5) out vec3 tint;

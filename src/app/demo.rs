@@ -156,7 +156,11 @@ fn still(
     let samples = timed(Antialias::Samples)?;
     let single = timed(Antialias::None)?;
     let median = |times: &BTreeMap<String, Vec<f64>>, passes: &[&str]| -> f64 {
-        passes.iter().filter_map(|pass| times.get(*pass)).map(|times| spread(times).median).fold(0.0, |sum, ms| sum + ms)
+        passes
+            .iter()
+            .filter_map(|pass| times.get(*pass))
+            .map(|times| spread(times).median)
+            .fold(0.0, |sum, ms| sum + ms)
     };
     let draw = ["draw", "smooth"];
     Ok(DemoRow {

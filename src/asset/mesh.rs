@@ -62,6 +62,18 @@ impl Attributes {
         Attributes { colors: of(&self.colors, used), uvs: of(&self.uvs, used), tints: of(&self.tints, used) }
     }
 
+    /// Adds those of further vertices, which have the same kinds.
+    pub(crate) fn extend(&mut self, more: &Attributes) {
+        fn add<T: Copy>(to: &mut Option<Vec<T>>, more: &Option<Vec<T>>) {
+            if let Some(more) = more {
+                to.get_or_insert_default().extend(more);
+            }
+        }
+        add(&mut self.colors, &more.colors);
+        add(&mut self.uvs, &more.uvs);
+        add(&mut self.tints, &more.tints);
+    }
+
     /// Adds the attributes of a vertex halfway between two others.
     pub(crate) fn add_middle(&mut self, a: usize, b: usize) {
         if let Some(colors) = &mut self.colors {

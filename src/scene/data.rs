@@ -343,6 +343,10 @@ pub struct MeshData {
     /// The pose of the part's skin and morph targets. The default leaves it as it is stored.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub pose: Option<PoseData>,
+    /// Primitives at rest of a glTF file that are one mesh, in the file's world: place and number of each. Places are the
+    /// nodes of the file's scene, those that carry before those that are carried, and each instance of a node.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub joined: Option<Vec<[usize; 2]>>,
     /// A generator, written as `plane = {...}`, `sphere = {...}` and so on.
     #[serde(flatten, skip_serializing_if = "Option::is_none")]
     pub generator: Option<Generator>,
@@ -361,7 +365,16 @@ pub struct PoseData {
 impl MeshData {
     /// A mesh that a generator makes, or that neither a file nor a generator gives.
     pub fn new(name: impl Into<String>, generator: Option<Generator>) -> Self {
-        MeshData { name: name.into(), file: None, part: None, piece: None, bend: None, pose: None, generator }
+        MeshData {
+            name: name.into(),
+            file: None,
+            part: None,
+            piece: None,
+            bend: None,
+            pose: None,
+            joined: None,
+            generator,
+        }
     }
 }
 
@@ -377,10 +390,11 @@ impl<'de> Deserialize<'de> for MeshData {
             piece: Option<u32>,
             bend: Option<[f64; 9]>,
             pose: Option<PoseData>,
+            joined: Option<Vec<[usize; 2]>>,
             #[serde(flatten)]
             rest: toml::Table,
         }
-        let Keys { name, file, part, piece, bend, pose, rest } = Keys::deserialize(source)?;
+        let Keys { name, file, part, piece, bend, pose, joined, rest } = Keys::deserialize(source)?;
         let fail = |what: &str| Err(D::Error::custom(format!("mesh {name:?} {what}")));
         if file.is_some() != rest.is_empty() {
             return fail("has either a file or one generator");
@@ -390,6 +404,9 @@ impl<'de> Deserialize<'de> for MeshData {
         if part.is_some() && !of_gltf || is_of_part && part.is_none() {
             return fail("takes a part of a glTF file alone, and a piece, a bend and a pose of a part alone");
         }
+        if joined.is_some() && (!of_gltf || part.is_some()) {
+            return fail("takes either a part of a glTF file or several joined");
+        }
         if pose.is_some_and(|pose| !pose.time_s.is_finite()) {
             return fail("has a pose at a time that is not finite");
         }
@@ -398,7 +415,7 @@ impl<'de> Deserialize<'de> for MeshData {
         }
         let generator = (!rest.is_empty()).then(|| Generator::deserialize(toml::Value::Table(rest))).transpose();
         let generator = generator.map_err(|e| D::Error::custom(format!("mesh {name:?}: {}", e.message())))?;
-        Ok(Self { name, file, part, piece, bend, pose, generator })
+        Ok(Self { name, file, part, piece, bend, pose, joined, generator })
     }
 }
 

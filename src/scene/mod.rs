@@ -590,6 +590,9 @@ fn build_mesh(
             let part = gltf::Part { mesh, at, pose: data.pose, piece: data.piece };
             readers.get(file)?.part(part, bend, &data.name)?
         }
+        (Some(file), None) if data.joined.is_some() => {
+            readers.get(file)?.joined(data.joined.as_deref().unwrap_or_default(), &data.name)?
+        }
         (Some(file), None) if gltf::is_gltf(file) => {
             let path = folder.join(file);
             let (mesh, notes) = gltf::load_mesh(&path)?;

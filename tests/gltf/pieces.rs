@@ -86,3 +86,75 @@ fn a_quad_that_glows_is_a_rectangle_that_shines_from_both_sides() {
         }
     }
 }
+
+/// A file of more nodes than a scene has entities: neighbours at rest are one mesh, each where its node stands. What
+/// moves, glows or is wide stays alone.
+#[test]
+fn many_nodes_are_joined() {
+    let mut model = Model::default();
+    let corners: [[f32; 3]; 4] = [[0.0, 0.0, 0.0], [0.2, 0.0, 0.0], [0.0, 0.3, 0.0], [0.0, 0.0, 0.4]];
+    let positions = model.positions(corners.as_flattened());
+    let indices = model.indices(&[0, 2, 1, 0, 1, 3, 0, 3, 2, 1, 2, 3]);
+    let kinds: Vec<_> = [json!({}), json!({ "doubleSided": true }), json!({ "emissiveFactor": [1, 1, 1] })]
+        .into_iter()
+        .map(|material| {
+            let material = model.push("materials", material);
+            model.mesh(json!({ "POSITION": positions }), Some(indices), Some(material))
+        })
+        .collect();
+    let place = |i: usize| Vec3::new((i % 80) as f32, 0.0, (i / 80) as f32);
+    for i in 0..4400 {
+        let turn = Quat::from_rotation_y(i as f32);
+        let scale = if i % 5 == 0 { [1.0, -2.0, 1.0] } else { [1.0; 3] };
+        let node = json!({ "mesh": kinds[i % 2], "translation": place(i).to_array(), "rotation": turn.to_array(),
+            "scale": scale, "name": format!("node {i}") });
+        model.node(node);
+    }
+    model.node(json!({ "mesh": kinds[0], "scale": [500, 1, 500], "name": "ground" }));
+    model.node(json!({ "mesh": kinds[2], "translation": [3, 5, 3], "name": "lamp" }));
+    model.animate(0, 7, "translation", "LINEAR", &[0.0, 1.0], &[0.0, 0.0, 0.0, 1.0, 0.0, 0.0]);
+    let (import, scene) = load(&model);
+    assert!((100..400).contains(&scene.entities.len()), "{} entities", scene.entities.len());
+    for alone in ["node 7", "ground", "lamp"] {
+        assert_eq!(scene.entities.iter().filter(|entity| entity.name == alone).count(), 1, "{alone}");
+    }
+    let joined = || scene.entities.iter().filter(|entity| entity.name.contains("and others"));
+    let triangles: usize = joined().map(|entity| scene.meshes[entity.mesh].triangles.len()).sum();
+    assert_eq!(triangles, 4 * 4399);
+    for entity in joined() {
+        let mesh = &scene.meshes[entity.mesh];
+        assert!(mesh.is_closed(), "{}: its mirrored ones too", mesh.name);
+        assert!(mesh.bounding_sphere().1 < 20.0, "{}: {:?}", mesh.name, mesh.bounding_sphere());
+    }
+    // Each stands where its node does: the corner at its origin is a vertex there.
+    let vertices: Vec<Vec3> = joined().flat_map(|entity| scene.meshes[entity.mesh].positions.clone()).collect();
+    for i in (0..4400).step_by(97) {
+        assert!(vertices.iter().any(|vertex| vertex.distance(place(i)) < 1e-4), "node {i}");
+    }
+    for (here, there) in import.meshes.iter().zip(&scene.meshes) {
+        assert_eq!(here.content_hash(), there.content_hash());
+    }
+    assert!(import.notes.left_out().is_empty(), "{:?}", import.notes.left_out());
+}
+
+/// What names no place or primitive of the file is refused in one line.
+#[test]
+fn joined_primitives_that_are_not_there_are_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    bench(json!({})).write(folder.path(), "m");
+    for (joined, what) in [
+        ("[[9, 0]]", "place 9, primitive 0: there is no such place"),
+        ("[[0, 3]]", "place 0, primitive 3: there is no such primitive"),
+        ("[]", "a joined mesh has no primitives"),
+        ("[[0, 0]]\npart = [0, 0]", "takes either a part of a glTF file or several joined"),
+    ] {
+        let file = folder.path().join("m.toml");
+        let camera = "[camera]\neye = [0, 2, 5]\ntarget = [0, 0, 0]\n";
+        let text =
+            format!("{camera}[[mesh]]\nname = \"m\"\nfile = \"m.glb\"\njoined = {joined}\n[[entity]]\nmesh = \"m\"\n");
+        std::fs::write(&file, text).unwrap();
+        let error = Scene::load(&file).unwrap_err();
+        assert!(error.exit_code() == 4 && error.to_string().contains(what), "{joined}: {error}");
+        assert!(!error.to_string().trim_end().contains('\n'), "{error}");
+    }
+}

@@ -83,7 +83,10 @@ fn keys_that_are_read() -> BTreeMap<String, BTreeSet<String>> {
         add("[[entity]]", &format!("[[entity]]\nmotion = [{{ node = {{ {part}_keys = {{ zzz = 1 }} }} }}]"));
     }
     // These are read by hand; the complaint lists only generators.
-    tables.get_mut("[[mesh]]").unwrap().extend(["name", "file", "part", "piece", "bend", "pose"].map(str::to_owned));
+    tables
+        .get_mut("[[mesh]]")
+        .unwrap()
+        .extend(["name", "file", "part", "piece", "bend", "pose", "joined"].map(str::to_owned));
     tables
 }
 

@@ -5,7 +5,7 @@ use std::collections::HashMap;
 
 use ::gltf::json::mesh::{Mode, Primitive, Semantic};
 use ::gltf::json::validation::Checked;
-use glam::{DMat3, DVec3, Vec3};
+use glam::{DAffine3, DMat3, DVec3, Vec3};
 
 use super::accessor;
 use super::document::Document;
@@ -212,6 +212,20 @@ impl Shape {
             return Err(document.fail(&self.place, format!("there are fewer {} than positions", of.to_string())));
         }
         Ok(Some(self.source.iter().flat_map(|i| &numbers[*i as usize * stored..][..width]).copied().collect()))
+    }
+
+    /// How many triangles there are.
+    pub fn triangle_count(&self) -> usize {
+        self.triangles.len()
+    }
+
+    /// A ball around it where it stands: the middle of its box in its own frame, and the distance of the farthest vertex.
+    pub fn ball(&self, place: DAffine3) -> (DVec3, f64) {
+        let low = self.positions.iter().fold(Vec3::INFINITY, |low, p| low.min(*p));
+        let high = self.positions.iter().fold(Vec3::NEG_INFINITY, |high, p| high.max(*p));
+        let middle = 0.5 * (low + high).as_dvec3();
+        let reach = |p: &Vec3| place.transform_vector3(p.as_dvec3() - middle).length();
+        (place.transform_point3(middle), self.positions.iter().map(reach).fold(0.0, f64::max))
     }
 
     /// How many vertices there are.

@@ -65,6 +65,13 @@ pub struct Surface {
 }
 
 impl Surface {
+    /// Whether it lets no light through and does not glow.
+    pub fn is_solid(&self) -> bool {
+        let has_alpha = |paint: &Paint| paint.texture.alpha_cutoff.is_some() || paint.texture.alpha_blend;
+        let passes_light = self.opacity < 1.0 || self.paint.as_ref().is_some_and(has_alpha);
+        !passes_light && self.emission == Vec3::ZERO
+    }
+
     /// The surface that a material gives a shape.
     pub fn new(
         document: &Document,

@@ -15,7 +15,6 @@ layout(binding = 1) uniform textureBuffer vertices;
 #include "gloss_vertex.glsl"
 #endif
 layout(location = 0) out vec4 radiance; // w: 1
-invariant gl_Position; // what is drawn again by another pipeline lies at the same depth
 
 layout(push_constant) uniform Push {
     mat4 clip_from_object;
@@ -38,5 +37,6 @@ void main() {
 #else
     radiance.rgb += radiosity.rgb;
 #endif
-    gl_Position = push.clip_from_object * vec4(position, 1.0);
+    precise vec4 place = push.clip_from_object * vec4(position, 1.0); // what another pipeline draws again lies at the same depth
+    gl_Position = place;
 }

@@ -4,7 +4,6 @@ layout(location = 0) out vec3 at;      // object's frame, metres
 layout(location = 1) out vec3 weights; // of the triangle's three vertices
 layout(location = 2) flat out uvec3 triangle;
 layout(location = 3) out vec3 emission;
-invariant gl_Position; // the triangle lies at the depth at which it was drawn before
 #if PAINTED
 layout(location = 4) out vec2 uv;
 layout(location = 5) out vec3 tint;
@@ -22,8 +21,10 @@ layout(binding = 9) uniform utextureBuffer emissions; // the bits of three numbe
 #include "gloss_vertex.glsl"
 #endif
 
+// As draw.vert computes it, so that the triangle lies at the depth at which it was drawn before.
 vec4 clip_place(uint v) {
-    return push.clip_from_object * vec4(texelFetch(vertices, int(2 * (push.vertex_first + v))).xyz, 1.0);
+    precise vec4 place = push.clip_from_object * vec4(texelFetch(vertices, int(2 * (push.vertex_first + v))).xyz, 1.0);
+    return place;
 }
 
 // Whether the triangle is so small on the screen that its vertices carry an edge as well as pixels do.

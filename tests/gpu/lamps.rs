@@ -66,7 +66,7 @@ fn a_room_of_one_mesh_is_lit_by_its_ceiling_lamp() {
             ..EntityData::of_mesh("lamp")
         });
     let error = picture_error(&stage, &scene.build().unwrap());
-    assert!(error < 0.12, "{error}");
+    assert!(error < 0.06, "{error}");
 }
 
 /// A bulb within a shade lights what lies below, and nothing beside it.
@@ -104,5 +104,5 @@ fn no_light_comes_through_a_lamp_shade() {
             ..EntityData::of_mesh("bulb")
         });
     let error = picture_error(&stage, &scene.build().unwrap());
-    assert!(error < 0.08, "{error}");
+    assert!(error < 0.03, "{error}");
 }

@@ -214,7 +214,7 @@ fn direct_light_is_that_of_rays() {
             }
         }
     }
-    for ((degrees, [map, sh, whole]), limit) in degrees.iter().zip(sums).zip([0.075, 0.06, 0.04, 0.03, 0.03]) {
+    for ((degrees, [map, sh, whole]), limit) in degrees.iter().zip(sums).zip([0.055, 0.035, 0.02, 0.013, 0.013]) {
         let (map, sh) = ((map / whole).sqrt(), (sh / whole).sqrt());
         assert!(map < limit && map < 0.7 * sh, "{degrees} degrees: {map} by maps, {sh} by SH");
     }

@@ -464,24 +464,7 @@ impl Builder {
 
     /// Takes small parts at rest and makes entities of neighbours of one material.
     fn joined(&mut self, parts: &mut Vec<Placed>) -> Result<Vec<EntityData>> {
-        let mut candidates = Vec::new();
-        for (number, placed) in parts.iter().enumerate() {
-            let Some(primitive) = self.reader.primitive(placed.part)? else { continue };
-            let Primitive { shape, surface, .. } = &*primitive;
-            let stand = &placed.stand;
-            let rests = stand.motion.is_empty() && placed.part.pose.is_none();
-            let triangle_count = shape.triangle_count();
-            if rests
-                && surface.is_solid()
-                && triangle_count <= JOINED_TRIANGLES
-                && SplitTransform::new(stand.rest.matrix3).is_some()
-            {
-                let Attributes { uvs, tints, .. } = &surface.attributes;
-                let kind = (primitive.material, surface.paint.is_some(), uvs.is_some(), tints.is_some());
-                let (centre, radius_m) = shape.ball(stand.rest);
-                candidates.push(Candidate { part: number, kind, centre, radius_m, triangle_count });
-            }
-        }
+        let candidates = self.candidates(parts)?;
         let groups = join::neighbours(candidates, JOINED[0], JOINED[1]);
         let mut entities = Vec::with_capacity(groups.len());
         for group in &groups {
@@ -499,12 +482,35 @@ impl Builder {
         let taken: HashSet<usize> = groups.iter().flatten().copied().collect();
         let mut numbers = 0..;
         parts.retain(|_| !numbers.next().is_some_and(|number| taken.contains(&number)));
-        let [members, joined] = [taken.len(), groups.len()];
-        let notes = &mut self.reader.notes;
-        notes.say(format!(
-            "primitives at rest ({members}) are joined with neighbours of their material, to {joined} meshes"
-        ));
+        let members = taken.len();
+        let what = format!("primitives at rest ({members}) are joined with neighbours of their material");
+        self.reader.notes.say(format!("{what}, to {} meshes", groups.len()));
         Ok(entities)
+    }
+
+    /// The parts that may be joined. Only those of one material and of equal attributes are.
+    fn candidates(&mut self, parts: &[Placed]) -> Result<Vec<Candidate<(Option<usize>, [bool; 3])>>> {
+        let mut candidates = Vec::new();
+        for (number, placed) in parts.iter().enumerate() {
+            let Some(primitive) = self.reader.primitive(placed.part)? else { continue };
+            let Primitive { shape, surface, .. } = &*primitive;
+            let stand = &placed.stand;
+            let rests = stand.motion.is_empty() && placed.part.pose.is_none();
+            let is_small = shape.triangle_count() <= JOINED_TRIANGLES;
+            let is_flat = SplitTransform::new(stand.rest.matrix3).is_none();
+            if rests && surface.is_solid() && is_small && !is_flat {
+                let Attributes { uvs, tints, .. } = &surface.attributes;
+                let (centre, radius_m) = shape.ball(stand.rest);
+                candidates.push(Candidate {
+                    part: number,
+                    kind: (primitive.material, [surface.paint.is_some(), uvs.is_some(), tints.is_some()]),
+                    centre,
+                    radius_m,
+                    triangle_count: shape.triangle_count(),
+                });
+            }
+        }
+        Ok(candidates)
     }
 
     /// How many pieces a part is cut into. Lamps and surfaces that let light through stay whole, and so do the many cards

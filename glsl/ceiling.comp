@@ -18,7 +18,7 @@ layout(std430, binding = 0) readonly buffer Source { uvec2 source[]; };
 
 void main() {
     uint index = gl_GlobalInvocationID.x;
-    // Sixteen independent results, so that latency is hidden; none of them is equal to another or known when compiled, so that
+    // Sixteen independent results, so that latency is hidden. None is equal to another or known when compiled, so that
     // each is computed.
     vec4 start = vec4(index, index + 1, index + 2, index + 3);
     vec4 sums[4] = vec4[](start, 0.25 * start, 0.5 * start, 0.75 * start);

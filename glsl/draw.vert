@@ -37,6 +37,7 @@ void main() {
 #else
     radiance.rgb += radiosity.rgb;
 #endif
-    precise vec4 place = push.clip_from_object * vec4(position, 1.0); // what another pipeline draws again lies at the same depth
+    // Precise, so that what another pipeline draws again lies at the same depth.
+    precise vec4 place = push.clip_from_object * vec4(position, 1.0);
     gl_Position = place;
 }

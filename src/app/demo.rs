@@ -156,11 +156,8 @@ fn still(
     let samples = timed(Antialias::Samples)?;
     let single = timed(Antialias::None)?;
     let median = |times: &BTreeMap<String, Vec<f64>>, passes: &[&str]| -> f64 {
-        passes
-            .iter()
-            .filter_map(|pass| times.get(*pass))
-            .map(|times| spread(times).median)
-            .fold(0.0, |sum, ms| sum + ms)
+        let all: f64 = passes.iter().filter_map(|pass| times.get(*pass)).map(|times| spread(times).median).sum();
+        all + 0.0 // the sum of none is -0
     };
     let draw = ["draw", "smooth"];
     Ok(DemoRow {

@@ -62,6 +62,11 @@ impl Attributes {
         Attributes { colors: of(&self.colors, used), uvs: of(&self.uvs, used), tints: of(&self.tints, used) }
     }
 
+    /// Which of them there are: colours, texture coordinates and tints.
+    pub(crate) fn kinds(&self) -> [bool; 3] {
+        [self.colors.is_some(), self.uvs.is_some(), self.tints.is_some()]
+    }
+
     /// Adds those of further vertices, which have the same kinds.
     pub(crate) fn extend(&mut self, more: &Attributes) {
         fn add<T: Copy>(to: &mut Option<Vec<T>>, more: &Option<Vec<T>>) {

@@ -34,8 +34,8 @@ const NUDGE: f32 = 0.02;
 /// A member that is not convex casts its own sharp shadow on a cluster from this distance on, in its bounding radii;
 /// nearer ones are part of the cluster's maps. Convex ones never are: a floor below large walls would take all of them
 /// from maps, whose edges are coarse (built-in room, direct light: 0.041 RMS of radiance with them and 0.016 without).
-/// Outlines hold within the bounding sphere too, but not where what hides a light is around its receiver: a bulb in its shade
-/// errs 0.049 at 1.1 radii and 0.033 at 0.65, books on their shelf 0.0094, 0.0085 and at 0.5 radii 0.0120.
+/// Outlines hold within the bounding sphere too, but not where what hides a light is around its receiver: a bulb in its
+/// shade errs 0.049 at 1.1 radii and 0.033 at 0.65, books on their shelf 0.0094, 0.0085 and at 0.5 radii 0.0120.
 const FAR: f64 = 0.65;
 /// Share of the blocked cosine-weighted hemisphere that shows backs of triangles, from a place inside a solid or below a
 /// sheet.

@@ -33,15 +33,17 @@ impl Ceilings {
 const RUNS: usize = 5;
 /// Vector multiply-adds, or reads, per iteration.
 const READS: u32 = 16;
-/// Invocations of the shortest run, and the most of any: each writes 16 bytes.
-const INVOCATIONS: [u32; 2] = [1 << 14, 1 << 22];
+/// Invocations of the shortest run.
+const LEAST_INVOCATIONS: u32 = 1 << 14;
+/// Those of the longest. Each writes 16 bytes.
+const MOST_INVOCATIONS: u32 = 1 << 22;
 /// Least time of a run in those of an idle dispatch, so that the work is measured and not its start.
 const LEAST: f64 = 100.0;
 
 /// Measures a device with reads from a buffer of `field_bytes`.
 pub fn measure(device: &Arc<Device>, library: &Library, field_bytes: u64) -> Result<Ceilings> {
     let source = Buffer::with_data(device, "ceiling source", &vec![0x2000_2000_u32; field_bytes as usize / 4])?;
-    let out = Buffer::new(device, "ceiling results", BufferKind::Device, 16 * u64::from(INVOCATIONS[1]))?;
+    let out = Buffer::new(device, "ceiling results", BufferKind::Device, 16 * u64::from(MOST_INVOCATIONS))?;
     let pipeline = |kind: u32, rounds: u32, texel_bytes: u64| -> Result<ComputePipeline> {
         let texels = (field_bytes / texel_bytes).max(8);
         let row = ShaderPermutation::new("ceiling.comp", 4)
@@ -62,9 +64,9 @@ pub fn measure(device: &Arc<Device>, library: &Library, field_bytes: u64) -> Res
     let idle = seconds(0, &pipeline(0, 1, 8)?, 1)?;
     let rate = |kind: u32, rounds: u32, texel_bytes: u64| -> Result<f64> {
         let pipeline = pipeline(kind, rounds, texel_bytes)?;
-        let mut invocations = INVOCATIONS[0];
+        let mut invocations = LEAST_INVOCATIONS;
         let mut time = seconds(kind, &pipeline, invocations)?;
-        while time < LEAST * idle && invocations < INVOCATIONS[1] {
+        while time < LEAST * idle && invocations < MOST_INVOCATIONS {
             invocations *= 4;
             time = seconds(kind, &pipeline, invocations)?;
         }

@@ -22,7 +22,7 @@ pub fn differing_limit(device: &Device) -> f64 {
 
 /// How far corners move before rasterisation, in 1/256 of a pixel.
 pub(super) fn snapping(device: &Device) -> f64 {
-    f64::from(8 - device.limits.sub_pixel_precision_bits.min(8) as i32).exp2()
+    256.0 * device.snap_px().max(1.0 / 256.0)
 }
 
 /// Colours interpolated in f32, relative: a few roundings, of which those near a silhouette are the largest.

@@ -137,8 +137,8 @@ impl DrawGrid {
             None => self.maker.make("draw grid", &[vertex, fragment], state),
             Some(_) => {
                 // Corners of the grid and of its patches each snap by up to half of a step along both axes.
-                let snapped_px = (1.0 - self.maker.device.limits.sub_pixel_precision_bits as f32).exp2();
-                let nearer = GraphicsState { nearer_steps: NEARER_STEPS, nearer_px: snapped_px, ..state };
+                let nearer_px = 2.0 * self.maker.device.snap_px() as f32;
+                let nearer = GraphicsState { nearer_steps: NEARER_STEPS, nearer_px, ..state };
                 let vertex = vertex.define("BLOCK_CELLS", BLOCK_CELLS);
                 self.maker.make("draw grid pixels", &[vertex, fragment], nearer)
             }

@@ -12,9 +12,9 @@
 //!
 //! Direct light of the teapot's vertices is wrong by 0.046 under lights of 1 degree and by 0.009 under lights of 30
 //! degrees: root mean square against rays, over that of the unoccluded light (`tests/gpu/self_visibility.rs`). SH
-//! transfer of 4 bands gives 0.144 and 0.040. A rim on the horizon, or an equal-area
-//! square, gives larger errors. With 8 nodes a side the teapot's errors are 0.062 and 0.012, and those of a room of one mesh,
-//! lit through its window, 0.15 in place of 0.060; 16 a side leave 0.060 in twice the memory.
+//! transfer of 4 bands gives 0.144 and 0.040. A rim on the horizon, or an equal-area square, gives larger errors. With 8
+//! nodes a side the teapot's errors are 0.062 and 0.012, and those of a room of one mesh, lit through its window, 0.15 in
+//! place of 0.060; 16 a side leave 0.060 in twice the memory.
 
 use super::silhouette::{blocked_share, decode, encode};
 use glam::{DMat3, DVec2, DVec3};

@@ -73,6 +73,11 @@ impl Device {
         Ok(physical_devices(&instance.handle)?.into_iter().map(|(_, candidate)| candidate).collect())
     }
 
+    /// The step to which corners snap before rasterisation, pixels.
+    pub fn snap_px(&self) -> f64 {
+        (-f64::from(self.limits.sub_pixel_precision_bits)).exp2()
+    }
+
     /// Opens the chosen device with Vulkan 1.3 core features and no extension.
     pub fn new(options: &DeviceOptions) -> Result<Arc<Self>> {
         Self::with_extensions(options, &[], &[])

@@ -343,8 +343,8 @@ pub struct MeshData {
     /// The pose of the part's skin and morph targets. The default leaves it as it is stored.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub pose: Option<PoseData>,
-    /// Primitives at rest of a glTF file that are one mesh, in the file's world: place and number of each. Places are the
-    /// nodes of the file's scene, those that carry before those that are carried, and each instance of a node.
+    /// Primitives at rest of a glTF file that are one mesh, in the file's world: place and number of each. Places are
+    /// the nodes of the file's scene, those that carry before those that are carried, and each instance of a node.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub joined: Option<Vec<[usize; 2]>>,
     /// A generator, written as `plane = {...}`, `sphere = {...}` and so on.

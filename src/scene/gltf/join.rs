@@ -3,10 +3,14 @@
 
 use glam::{DAffine3, DVec3, Vec3};
 
+use super::document::Document;
 use super::shape::Shape;
 use crate::asset::Mesh;
 use crate::asset::mesh::Attributes;
 use crate::error::Result;
+
+/// Largest number of triangles of all meshes of a scene.
+const TRIANGLES_LIMIT: usize = 16_000_000;
 
 /// Triangles of several shapes in the world.
 #[derive(Default)]
@@ -19,22 +23,27 @@ pub struct Joined {
 
 impl Joined {
     /// Adds a shape where it stands. All shapes have the same kinds of attributes.
-    pub fn add(&mut self, shape: &Shape, place: DAffine3, attributes: &Attributes) {
+    pub fn add(&mut self, document: &Document, shape: &Shape, place: DAffine3, attributes: &Attributes) -> Result<()> {
         let (positions, normals, triangles) = shape.bent(place.matrix3, place.translation);
         let first = self.positions.len() as u32;
         self.positions.extend(positions);
         self.normals.extend(normals);
         self.attributes.extend(attributes);
         self.triangles.extend(triangles.iter().map(|t| t.map(|i| i + first)));
-    }
-
-    pub fn triangle_count(&self) -> usize {
-        self.triangles.len()
+        check_triangles(document, shape, self.triangles.len())
     }
 
     pub fn mesh(self, name: &str) -> Result<Mesh> {
         Mesh::with_attributes(name, self.positions, self.normals, self.attributes, self.triangles)
     }
+}
+
+/// Refuses a shape with which a scene has more triangles than it may have.
+pub fn check_triangles(document: &Document, shape: &Shape, count: usize) -> Result<()> {
+    if count > TRIANGLES_LIMIT {
+        return Err(document.fail(&shape.place, format!("over the limit of {TRIANGLES_LIMIT} triangles in all")));
+    }
+    Ok(())
 }
 
 /// A primitive that may be joined with others.

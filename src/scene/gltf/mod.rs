@@ -76,17 +76,17 @@ const FILL_SHARE: f64 = 0.1;
 const POSES: &str = "movements of skins and morph targets (they stand in one pose)";
 /// Most entities that primitives of several pieces may become, in all; beyond that every primitive stays whole.
 const PIECES_LIMIT: u32 = 512;
-/// Most parts of a file of which each is an entity; of more, neighbours at rest are joined. A frame of 4 000 boxes takes 6.3 s
-/// alone and 0.6 s joined, with 1.1 times the error.
+/// Most parts of a file of which each is an entity; of more, neighbours at rest are joined. A frame of 4 000 boxes takes
+/// 6.3 s alone and 0.6 s joined, with 1.1 times the error.
 const PARTS_LIMIT: usize = ENTITY_LIMIT / 2;
 /// Most different meshes of theirs. Lamps need one.
 const MESHES_LIMIT: usize = MESH_LIMIT - 1;
-/// About how many meshes those that are joined become, and the triangles of each, at most.
-const JOINED: [usize; 2] = [192, 1 << 16];
+/// About how many meshes those that are joined become.
+const JOINED_MESHES: usize = 192;
+/// Most triangles of each.
+const JOINED_TRIANGLES: usize = 1 << 16;
 /// Most triangles of a primitive that is joined with others.
-const JOINED_TRIANGLES: usize = 4096;
-/// Largest number of triangles of all meshes of a scene.
-const TRIANGLES_LIMIT: usize = 16_000_000;
+const SMALL_TRIANGLES: usize = 4096;
 
 /// A file as a scene.
 pub struct Import {
@@ -146,12 +146,7 @@ pub fn load_mesh(path: &Path) -> Result<(Mesh, Notes)> {
         let Some(mesh) = document.root.nodes[stand.node].mesh.map(|mesh| mesh.value()) else { continue };
         for at in 0..document.root.meshes[mesh].primitives.len() {
             let Some(shape) = Shape::read(&document, mesh, at, pose.as_ref(), &mut notes)? else { continue };
-            joined.add(&shape, place, &Attributes::default());
-            if joined.triangle_count() > TRIANGLES_LIMIT {
-                return Err(
-                    document.fail(&shape.place, format!("over the limit of {TRIANGLES_LIMIT} triangles in all"))
-                );
-            }
+            joined.add(&document, &shape, place, &Attributes::default())?;
         }
     }
     let name = path.file_stem().unwrap_or_default().to_string_lossy();
@@ -200,10 +195,11 @@ struct Placed {
     part: Part,
 }
 
-/// What tells the scaled copies of a mesh apart: nothing for those of a uniform scale.
-fn bend_of(stand: &Stand) -> Option<[u64; 9]> {
-    let split = SplitTransform::new(stand.fixed.matrix3).filter(|split| split.uniform_scale().is_none());
-    split.map(|split| split.bend.to_cols_array().map(f64::to_bits))
+/// What tells meshes apart: primitive, piece and bend, the bend as bits.
+type MeshKey = (PartKey, Option<u32>, [u64; 9]);
+
+fn mesh_key(part: Part, bend: DMat3) -> MeshKey {
+    (part.key(), part.piece, bend.to_cols_array().map(|x| (x + 0.0).to_bits()))
 }
 
 /// Where nodes stand and how they move.
@@ -281,14 +277,11 @@ impl Reader {
             let mesh = mesh.filter(has).ok_or_else(|| fail("there is no such primitive"))?;
             let part = Part { mesh, at, pose: None, piece: None };
             let primitive = self.primitive(part)?.ok_or_else(|| fail("it has no triangles"))?;
-            let kinds = |of: &Primitive| {
-                let Attributes { colors, uvs, tints } = &of.surface.attributes;
-                [colors.is_some(), uvs.is_some(), tints.is_some()]
-            };
-            if first.as_ref().is_some_and(|first| kinds(first) != kinds(&primitive)) {
+            let attributes = &primitive.surface.attributes;
+            if first.as_ref().is_some_and(|first| first.surface.attributes.kinds() != attributes.kinds()) {
                 return Err(fail("its vertices have other attributes than those of the others"));
             }
-            joined.add(&primitive.shape, stand.rest, &primitive.surface.attributes);
+            joined.add(&document, &primitive.shape, stand.rest, attributes)?;
             first.get_or_insert(primitive);
         }
         let first = first.ok_or_else(|| document.fail("meshes", "a joined mesh has no primitives"))?;
@@ -299,10 +292,7 @@ impl Reader {
     /// Counts the triangles of a mesh that the scene keeps, and adds its backs.
     fn counted(&mut self, primitive: &Primitive, mesh: Mesh) -> Result<Mesh> {
         self.triangle_count += mesh.triangles.len();
-        if self.triangle_count > TRIANGLES_LIMIT {
-            let what = format!("over the limit of {TRIANGLES_LIMIT} triangles in all");
-            return Err(self.document.fail(&primitive.shape.place, what));
-        }
+        join::check_triangles(&self.document, &primitive.shape, self.triangle_count)?;
         Ok(if primitive.surface.has_backs && !mesh.is_closed() { mesh.with_backs() } else { mesh })
     }
 
@@ -362,8 +352,7 @@ impl<'f> Readers<'f> {
 struct Builder {
     reader: Reader,
     options: Options,
-    /// Meshes by primitive, piece and bend, the bend as bits.
-    made: HashMap<(PartKey, Option<u32>, [u64; 9]), Made>,
+    made: HashMap<MeshKey, Made>,
     meshes: Vec<(MeshData, Arc<Mesh>)>,
     /// Names of textures by material and colour.
     painted: HashMap<(Option<usize>, [u32; 3]), String>,
@@ -438,7 +427,9 @@ impl Builder {
     /// their outlines hold up to where they touch: a table is a board and its legs. What moves stays whole, because one
     /// field costs a merge less than many.
     fn entities(&mut self, mut parts: Vec<Placed>) -> Result<Vec<EntityData>> {
-        let meshes: HashSet<_> = parts.iter().map(|Placed { stand, part, .. }| (part.key(), bend_of(stand))).collect();
+        let bend = |stand: &Stand| SplitTransform::new(stand.fixed.matrix3).map(|split| split.baked());
+        let key = |placed: &Placed| Some(mesh_key(placed.part, bend(&placed.stand)?));
+        let meshes: HashSet<MeshKey> = parts.iter().filter_map(key).collect();
         let mut entities = Vec::new();
         if parts.len() > PARTS_LIMIT || meshes.len() > MESHES_LIMIT {
             entities = self.joined(&mut parts)?;
@@ -465,7 +456,7 @@ impl Builder {
     /// Takes small parts at rest and makes entities of neighbours of one material.
     fn joined(&mut self, parts: &mut Vec<Placed>) -> Result<Vec<EntityData>> {
         let candidates = self.candidates(parts)?;
-        let groups = join::neighbours(candidates, JOINED[0], JOINED[1]);
+        let groups = join::neighbours(candidates, JOINED_MESHES, JOINED_TRIANGLES);
         let mut entities = Vec::with_capacity(groups.len());
         for group in &groups {
             let first = &parts[group[0]];
@@ -489,21 +480,20 @@ impl Builder {
     }
 
     /// The parts that may be joined. Only those of one material and of equal attributes are.
-    fn candidates(&mut self, parts: &[Placed]) -> Result<Vec<Candidate<(Option<usize>, [bool; 3])>>> {
+    fn candidates(&mut self, parts: &[Placed]) -> Result<Vec<Candidate<(Option<usize>, bool, [bool; 3])>>> {
         let mut candidates = Vec::new();
         for (number, placed) in parts.iter().enumerate() {
             let Some(primitive) = self.reader.primitive(placed.part)? else { continue };
             let Primitive { shape, surface, .. } = &*primitive;
             let stand = &placed.stand;
             let rests = stand.motion.is_empty() && placed.part.pose.is_none();
-            let is_small = shape.triangle_count() <= JOINED_TRIANGLES;
+            let is_small = shape.triangle_count() <= SMALL_TRIANGLES;
             let is_flat = SplitTransform::new(stand.rest.matrix3).is_none();
             if rests && surface.is_solid() && is_small && !is_flat {
-                let Attributes { uvs, tints, .. } = &surface.attributes;
-                let (centre, radius_m) = shape.ball(stand.rest);
+                let (centre, radius_m) = shape.sphere(stand.rest);
                 candidates.push(Candidate {
                     part: number,
-                    kind: (primitive.material, [surface.paint.is_some(), uvs.is_some(), tints.is_some()]),
+                    kind: (primitive.material, surface.paint.is_some(), surface.attributes.kinds()),
                     centre,
                     radius_m,
                     triangle_count: shape.triangle_count(),
@@ -537,7 +527,7 @@ impl Builder {
         if stand.fixed.translation.abs().max_element() > f64::from(POSITION_LIMIT_M) {
             return Err(document.fail(place, "it stands beyond the limit of 1e7 m"));
         }
-        let made = self.mesh(part, &primitive, if scale.is_some() { DMat3::IDENTITY } else { parts.bend })?;
+        let made = self.mesh(part, &primitive, parts.baked())?;
         let mut name = document.root.nodes[stand.node].name.clone().unwrap_or_else(|| format!("node {}", stand.node));
         if document.root.meshes[part.mesh].primitives.len() > 1 {
             name = format!("{name} {}", part.at);
@@ -610,7 +600,7 @@ impl Builder {
 
     /// The mesh of a part under a bend. A rectangle that glows in one colour is turned to where lamps lie.
     fn mesh(&mut self, part: Part, primitive: &Primitive, mut bend: DMat3) -> Result<Made> {
-        let key = (part.key(), part.piece, bend.to_cols_array().map(|x| (x + 0.0).to_bits()));
+        let key = mesh_key(part, bend);
         if let Some(made) = self.made.get(&key) {
             return Ok(made.clone());
         }

@@ -12,7 +12,7 @@ use super::document::Document;
 use super::notes::Notes;
 use super::pose::Pose;
 use crate::asset::mesh::{Attributes, TRIANGLE_LIMIT, area_m2};
-use crate::asset::{Mesh, topology};
+use crate::asset::{Mesh, enclose, topology};
 use crate::error::Result;
 
 /// Most pieces that a primitive is cut into.
@@ -219,13 +219,10 @@ impl Shape {
         self.triangles.len()
     }
 
-    /// A ball around it where it stands: the middle of its box in its own frame, and the distance of the farthest vertex.
-    pub fn ball(&self, place: DAffine3) -> (DVec3, f64) {
-        let low = self.positions.iter().fold(Vec3::INFINITY, |low, p| low.min(*p));
-        let high = self.positions.iter().fold(Vec3::NEG_INFINITY, |high, p| high.max(*p));
-        let middle = 0.5 * (low + high).as_dvec3();
-        let reach = |p: &Vec3| place.transform_vector3(p.as_dvec3() - middle).length();
-        (place.transform_point3(middle), self.positions.iter().map(reach).fold(0.0, f64::max))
+    /// Centre and radius of a sphere around it where it stands.
+    pub fn sphere(&self, place: DAffine3) -> (DVec3, f64) {
+        let points: Vec<_> = self.positions.iter().map(|p| (place.transform_point3(p.as_dvec3()), 0.0)).collect();
+        enclose::around_spheres(&points).unwrap_or_default()
     }
 
     /// How many vertices there are.

@@ -88,6 +88,11 @@ impl SplitTransform {
         let largest = rest.to_cols_array().into_iter().fold(0.0, |most: f64, x| most.max(x.abs()));
         (largest <= SAME * scale && scale > 0.0).then_some(scale)
     }
+
+    /// What is baked into a copy of the mesh: nothing of a uniform scale.
+    pub fn baked(&self) -> DMat3 {
+        if self.uniform_scale().is_some() { DMat3::IDENTITY } else { self.bend }
+    }
 }
 
 /// All nodes of the file's scene, those that carry before those that are carried.

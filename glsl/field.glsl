@@ -31,6 +31,35 @@ vec2 field_plane(vec3 p, float edges, out float face) {
     return at + (1.0 - edges) * (min(at - 1.0, 0.0) + max(at - CELLS, 0.0));
 }
 
+// The corners of the tetrahedron around `at` in a block of samples from number `first` on; `last` is the last cell along
+// each axis, `stride` how far apart the numbers of neighbours are, `scale` a factor on all weights. A cell is cut into
+// six tetrahedra about its diagonal from the sample of even numbers to that of odd ones, so that cells that touch are
+// cut alike. Along each the fractions fall in one order.
+FieldPlace simplex(vec3 at, vec3 last, vec3 stride, float first, float scale) {
+    vec3 low = min(floor(at), last);
+    vec3 odd = low - 2.0 * floor(0.5 * low);
+    vec3 up = 1.0 - 2.0 * odd;
+    vec3 f = odd + up * (at - low);
+    first += dot(low + odd, stride);
+    stride *= up;
+    float all = first + stride.x + stride.y + stride.z;
+    float most = max(max(f.x, f.y), f.z), least = min(min(f.x, f.y), f.z);
+    float middle = f.x + f.y + f.z - most - least;
+    float by_most = f.x == most ? stride.x : f.y == most ? stride.y : stride.z;
+    float by_least = f.z == least ? stride.z : f.y == least ? stride.y : stride.x;
+
+    FieldPlace place;
+    place.corner[0] = uint(first);
+    place.corner[1] = uint(first + by_most);
+    place.corner[2] = uint(all - by_least);
+    place.corner[3] = uint(all);
+    place.weight[0] = scale * (1.0 - most);
+    place.weight[1] = scale * (most - middle);
+    place.weight[2] = scale * (middle - least);
+    place.weight[3] = scale * least;
+    return place;
+}
+
 // Place in the stored arrangement: x and y along a face, z from shell to shell; samples are at whole numbers.
 const float COLUMNS = CELLS + 2;
 const float PLANE = 6.0 * COLUMNS * COLUMNS;
@@ -52,31 +81,8 @@ FieldPlace field_place(vec3 p, vec4 radial, float edges) {
     float face;
     at.xy = field_plane(p, edges, face);
     at.z = clamp(radial.x * sqrt(0.5 * h) + radial.y, 0.0, SHELLS - 1.0);
-    // A cell is cut into six tetrahedra about its diagonal from the sample of even numbers to that of odd ones, so that
-    // cells that touch are cut alike. Along each the fractions fall in one order.
-    vec3 low = min(floor(at), vec3(CELLS, CELLS, max(SHELLS - 2.0, 0.0)));
-    vec3 odd = low - 2.0 * floor(0.5 * low);
-    vec3 up = 1.0 - 2.0 * odd;
-    vec3 f = odd + up * (at - low);
-    vec3 stride = vec3(1.0, COLUMNS, SHELLS > 1 ? PLANE : 0.0);
-    float first = face * COLUMNS * COLUMNS + dot(low + odd, stride);
-    stride *= up;
-    float all = first + stride.x + stride.y + stride.z;
-    float most = max(max(f.x, f.y), f.z), least = min(min(f.x, f.y), f.z);
-    float middle = f.x + f.y + f.z - most - least;
-    float by_most = f.x == most ? stride.x : f.y == most ? stride.y : stride.z;
-    float by_least = f.z == least ? stride.z : f.y == least ? stride.y : stride.x;
-
-    FieldPlace place;
-    place.corner[0] = uint(first);
-    place.corner[1] = uint(first + by_most);
-    place.corner[2] = uint(all - by_least);
-    place.corner[3] = uint(all);
-    place.weight[0] = unscale * (1.0 - most);
-    place.weight[1] = unscale * (most - middle);
-    place.weight[2] = unscale * (middle - least);
-    place.weight[3] = unscale * least;
-    return place;
+    return simplex(at, vec3(CELLS, CELLS, max(SHELLS - 2.0, 0.0)), vec3(1.0, COLUMNS, SHELLS > 1 ? PLANE : 0.0),
+                   face * COLUMNS * COLUMNS, unscale);
 }
 
 // Each has field_sums: the weighted sums of one channel of the field whose first quad is `base`; samples are

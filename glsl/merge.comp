@@ -24,7 +24,7 @@ READ_VEC4(5, Vertices, vertices, vertex_quad)
 #if TEXEL
 READ_VEC4(6, Sky, sky, sky_quad)
 #else
-layout(std140, binding = 6) uniform Sky { vec4 sky[3 * CHANNEL_QUADS]; };
+layout(std140, binding = 6) uniform Sky { vec4 sky[3 * CHANNEL_QUADS + 2 * VOLUME]; };
 vec4 sky_quad(uint i) {
     return sky[i];
 }
@@ -134,10 +134,6 @@ void look(Vertex vertex, uint packed, float t_start[CHAIN], inout float t[CHAIN]
 }
 
 #if SKIP_CAPS
-bool is_cap(uint packed) {
-    return (packed & (ENTRY_LIGHT | ENTRY_CAP)) == ENTRY_CAP;
-}
-
 // An entry that takes an occluder for a cap.
 void cover(Vertex vertex, uint packed, inout float t[CHAIN]) {
     uint e = packed & SKY_CHAIN;
@@ -153,15 +149,31 @@ void cover(Vertex vertex, uint packed, inout float t[CHAIN]) {
 
 // Whether an entry reads a field.
 bool is_look(uint packed) {
-    bool look = true;
-#if SKIP_CAPS
-    look = look && !is_cap(packed);
-#endif
-#if SHEETS
-    look = look && !is_sheet(packed);
-#endif
-    return look;
+    return (packed & ENTRY_LIGHT) != 0 || (packed & 3u << ENTRY_CHANNEL) == 0;
 }
+
+#if VOLUME
+// An entry that takes all that rests out of the chain as it began. Near the sides of the volume it fades into the chain
+// of single fields, which comes before it.
+void take_volume(Vertex vertex, float t_start[CHAIN], inout float t[CHAIN]) {
+    vec4 first = sky_quad(3 * CHANNEL_QUADS);      // the first node, 1 / step
+    vec4 counts = sky_quad(3 * CHANNEL_QUADS + 1); // nodes along each axis, and where they begin
+    vec3 last = counts.xyz - 1.0;
+    vec3 at = (vertex.receiver - first.xyz + vertex.position) * first.w;
+    vec3 depth = min(at, last - at);
+    float share = smoothstep(0.0, 1.0, min(min(depth.x, depth.y), depth.z));
+    FieldPlace place = simplex(clamp(at, vec3(0.0), last), last - 1.0, vec3(1.0, counts.x, counts.x * counts.y), 0.0,
+                               FIELD_UNIT);
+    float b[FETCHED];
+    field_gather(place, VOLUME_UNIT * uint(counts.w), FIELD_QUADS, b);
+    float through[CHAIN] = t_start;
+    chain_multiply(through, b);
+    [[unroll]] for (uint k = 0; k < TERMS; k++) {
+        t[k] = mix(t[k], through[k], share);
+    }
+    t[TERMS] = chain_rest(t);
+}
+#endif
 
 #if SHEETS
 // An entry that takes a sheet.
@@ -222,7 +234,7 @@ void main() {
         // loop. It jumps nowhere else, so entries of either kind run as loops of their own, each in turn as long as
         // there are such entries.
         do {
-#if SKIP_CAPS || SHEETS
+#if SKIP_CAPS || SHEETS || VOLUME
             do {
                 if (is_look(packed)) {
                     look(vertex, packed, t_start, t, sum);
@@ -232,21 +244,28 @@ void main() {
             } while (i < cluster.entry_count && is_look(packed));
 #if SKIP_CAPS
             do {
-                if (i < cluster.entry_count && is_cap(packed)) {
+                if (i < cluster.entry_count && is_kind(packed, ENTRY_CAP)) {
                     cover(vertex, packed, t);
                     i++;
                     packed = entry_at(cluster.entry_first + min(i, cluster.entry_count - 1));
                 }
-            } while (i < cluster.entry_count && is_cap(packed));
+            } while (i < cluster.entry_count && is_kind(packed, ENTRY_CAP));
 #endif
 #if SHEETS
             do {
-                if (i < cluster.entry_count && is_sheet(packed)) {
+                if (i < cluster.entry_count && is_kind(packed, ENTRY_SHEET)) {
                     take_sheet(vertex, packed, t);
                     i++;
                     packed = entry_at(cluster.entry_first + min(i, cluster.entry_count - 1));
                 }
-            } while (i < cluster.entry_count && is_sheet(packed));
+            } while (i < cluster.entry_count && is_kind(packed, ENTRY_SHEET));
+#endif
+#if VOLUME
+            if (i < cluster.entry_count && is_kind(packed, ENTRY_VOLUME)) {
+                take_volume(vertex, t_start, t);
+                i++;
+                packed = entry_at(cluster.entry_first + min(i, cluster.entry_count - 1));
+            }
 #endif
 #else
             look(vertex, entry_at(cluster.entry_first + i), t_start, t, sum);

@@ -41,9 +41,11 @@ const uint SKY_CHAIN = (1u << ENTRY_BITS) - 1u;
 const uint ENTRY_LIGHT = 1u << 2 * ENTRY_BITS;      // meets the light rather than multiplying an occluder
 const uint ENTRY_CHANNEL = 2 * ENTRY_BITS + 1;      // two bits: 0 to 2 for a channel of a radiance field, 3 for a light of one colour
 const uint ENTRY_LAST = 1u << 2 * ENTRY_BITS + 3;   // ends the chain: the next entry begins anew from the transfer
-const uint ENTRY_CAP = 1u << ENTRY_CHANNEL;         // without ENTRY_LIGHT: an occluder as a cap
-const uint ENTRY_SHEET = 2u << ENTRY_CHANNEL;       // without ENTRY_LIGHT: an occluder that is a sheet
+// Without ENTRY_LIGHT, in place of a channel:
+const uint ENTRY_CAP = 1u;    // an occluder as a cap
+const uint ENTRY_SHEET = 2u;  // an occluder that is a sheet
+const uint ENTRY_VOLUME = 3u; // all that rests
 
-bool is_sheet(uint packed) {
-    return (packed & (ENTRY_LIGHT | ENTRY_SHEET)) == ENTRY_SHEET;
+bool is_kind(uint packed, uint kind) {
+    return (packed & (ENTRY_LIGHT | 3u << ENTRY_CHANNEL)) == kind << ENTRY_CHANNEL;
 }

@@ -324,11 +324,7 @@ uint chain_light(uint packed) {
 
 // Whether an entry is an occluder whose outline is looked up.
 bool has_outline(uint packed) {
-#if SHEETS
-    return (packed & (ENTRY_LIGHT | ENTRY_SHEET)) == 0;
-#else
-    return (packed & ENTRY_LIGHT) == 0;
-#endif
+    return is_kind(packed, 0);
 }
 
 #if CONES
@@ -441,7 +437,7 @@ vec3 chain_sum(Surface surface, Entity shining, bool open, uint first, uint coun
                 shadow.edges[k] = vec3(0.0);
             }
             do {
-                if (is_sheet(packed)) {
+                if (is_kind(packed, ENTRY_SHEET)) {
                     pass_sheet(shadow, ENTITY(packed & SKY_CHAIN), surface, light, block);
 #if EDGES
                     near_occluders |= occluder_bit(packed & SKY_CHAIN);
@@ -449,7 +445,7 @@ vec3 chain_sum(Surface surface, Entity shining, bool open, uint first, uint coun
                     j = next_entry(surface, first, count, j + 1, true);
                     packed = entry_at(first + j);
                 }
-            } while (is_sheet(packed) && j < count);
+            } while (is_kind(packed, ENTRY_SHEET) && j < count);
             share *= shadow.free;
 #if EDGES
             nearest = max(nearest, finest);

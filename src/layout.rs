@@ -263,6 +263,8 @@ pub enum ListEntry {
     Cap { entity: u32, light: Option<u32> },
     /// As [`ListEntry::Occlude`], of a sheet.
     Sheet { entity: u32, light: Option<u32> },
+    /// Multiply the sky's chain by the visibility past all that rests, from where it began; it names its receiver.
+    Volume { receiver: u32 },
     /// Meet a light; `channel` is `None` for a light of one colour, which shares the occlusion field.
     Shine {
         entity: u32,
@@ -291,6 +293,9 @@ impl ListEntry {
             ListEntry::Sheet { entity, light } => {
                 ListEntry::Occlude { entity, light }.pack() | 2 << (2 * ENTRY_BITS + 1)
             }
+            ListEntry::Volume { receiver } => {
+                ListEntry::Occlude { entity: receiver, light: None }.pack() | 3 << (2 * ENTRY_BITS + 1)
+            }
             ListEntry::Shine { entity, channel, last } => {
                 let flags = 1 | channel.unwrap_or(3) << 1 | u32::from(last) << 3;
                 entity | entity << ENTRY_BITS | flags << (2 * ENTRY_BITS)
@@ -299,6 +304,9 @@ impl ListEntry {
     }
 }
 
+/// Alignment, in bytes, of everything that a pass may bind as a range. It is the largest that Vulkan lets a device ask
+/// for.
+pub const ALIGNMENT: u64 = 256;
 /// The weight of what may be anywhere, and a length beyond all others: more than any light makes negligible.
 pub const EVERYTHING: f64 = 1e30;
 /// Flag of a grid's cell whose diagonal runs from corner (0, 0) to (1, 1), not from (1, 0) to (0, 1).

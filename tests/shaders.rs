@@ -149,6 +149,7 @@ fn usual_permutation() -> MergePermutation {
         skip: Skip::ALL,
         lights: true,
         sheets: true,
+        volume: false,
         gloss: false,
         entity_limit: 48,
     }
@@ -177,6 +178,7 @@ fn merging() -> Vec<ShaderPermutation> {
     permutations.push(MergePermutation { lattice: lattice("cube:1x1,inner=1.02"), ..usual });
     permutations.push(MergePermutation { lights: false, ..usual });
     permutations.push(MergePermutation { sheets: false, ..usual });
+    permutations.push(MergePermutation { volume: true, ..usual });
     permutations.push(MergePermutation { gloss: true, ..usual });
     permutations.extend([(4, 5), (3, 4), (4, 3)].map(|(bands, field_bands)| MergePermutation {
         bands,

@@ -5,11 +5,13 @@ pub use super::names::field_name;
 use super::names::{identity, silhouette_identity, silhouette_name};
 use super::silhouette::{bake_silhouette, silhouette_header};
 use super::surfaces::{BakedSurface, GroupPlan};
+use super::visibility_volume::VolumePlan;
 use super::{BakeReport, Baker, Options, Progress};
 use crate::asset::mesh::Mesh;
 use crate::error::Result;
-use crate::field::file::{self, SURFACES_MAGIC};
+use crate::field::file::{self, SURFACES_MAGIC, VOLUME_MAGIC};
 use crate::field::silhouette::SilhouetteField;
+use crate::field::visibility_volume::VisibilityVolume;
 use crate::field::{FieldHeader, ShadowField};
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
@@ -29,6 +31,7 @@ struct InMemory {
     fields: HashMap<String, Arc<ShadowField>>,
     silhouettes: HashMap<String, Arc<SilhouetteField>>,
     surfaces: HashMap<String, Arc<Vec<BakedSurface>>>,
+    volumes: HashMap<String, Arc<VisibilityVolume>>,
 }
 
 struct Shelf<T> {
@@ -39,6 +42,8 @@ struct Shelf<T> {
 const FIELDS: Shelf<ShadowField> = Shelf { ending: "sf", memory: |all| &mut all.fields };
 const SILHOUETTES: Shelf<SilhouetteField> = Shelf { ending: "outlines", memory: |all| &mut all.silhouettes };
 const SURFACES: Shelf<Vec<BakedSurface>> = Shelf { ending: "view", memory: |all| &mut all.surfaces };
+const VOLUMES: Shelf<VisibilityVolume> = Shelf { ending: "volume", memory: |all| &mut all.volumes };
+
 /// What the cache held or a bake has made, and the report of the bake, if there was one.
 pub type CacheAnswer<T> = (Arc<T>, Option<BakeReport>);
 
@@ -109,6 +114,10 @@ impl Cache {
         group.key.as_ref().is_none_or(|key| self.has(&SURFACES, key))
     }
 
+    pub fn has_volume(&self, plan: &VolumePlan) -> bool {
+        self.has(&VOLUMES, &plan.key)
+    }
+
     /// The field that `header` describes, and the report of its bake, which is `None` if the cache held the field.
     pub fn field(
         &self,
@@ -172,5 +181,27 @@ impl Cache {
             file::write(path, SURFACES_MAGIC, &header, &payload)
         };
         (self.keep(&SURFACES, key.clone(), made, write), Some(report))
+    }
+
+    /// The visibility volume of a group, and the report of its bake, which is `None` if the cache held it.
+    pub fn volume(
+        &self,
+        group: &GroupPlan,
+        plan: &VolumePlan,
+        progress: Progress<'_>,
+    ) -> CacheAnswer<VisibilityVolume> {
+        let read = |path: &Path| {
+            let (header, payload) = file::read(path, VOLUME_MAGIC)?;
+            Ok(plan.restore(&header, &payload))
+        };
+        if let Some(found) = self.look(&VOLUMES, &plan.key, read) {
+            return (found, None);
+        }
+        let (made, report) = group.bake_volume(plan, progress);
+        let write = |path: &Path, volume: &VisibilityVolume| {
+            let (header, payload) = plan.store(volume);
+            file::write(path, VOLUME_MAGIC, &header, &payload)
+        };
+        (self.keep(&VOLUMES, plan.key.clone(), made, write), Some(report))
     }
 }

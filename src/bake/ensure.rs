@@ -6,8 +6,10 @@ use super::surfaces::{BakedSurface, SurfacePlan};
 use super::{BakeReport, Baker, Options, Progress, Wanted, header};
 use crate::asset::Mesh;
 use crate::error::Result;
+use crate::field::quantity::channel_stride;
 use crate::field::silhouette::SilhouetteField;
 use crate::field::silhouette_nodes::NodeGrid;
+use crate::field::visibility_volume::SceneVolume;
 use crate::field::{FieldHeader, FieldKind, ShadowField};
 use crate::scene::Scene;
 use crate::scene::groups::Groups;
@@ -44,6 +46,8 @@ pub struct BakedScene {
     pub near: Vec<Vec<Vec<u32>>>,
     /// Entities that never move against each other, in the order of the members of their group.
     pub rigid: Vec<Vec<usize>>,
+    /// What all that rests blocks where other things move.
+    pub volume: Option<SceneVolume>,
     /// Bakes that were not found in the cache.
     pub baked: Vec<Baked>,
 }
@@ -79,12 +83,16 @@ impl SceneNeeds {
         SceneNeeds { meshes, surfaces, groups, options: *options }
     }
 
-    /// Bytes of the fields, each rounded up to a multiple of `alignment`. Equal fields count once.
+    /// Bytes of the fields, each rounded up to a multiple of `alignment`, and of the visibility volume. Equal fields count
+    /// once.
     pub fn field_bytes(&self, alignment: u64) -> u64 {
         let mut known = HashSet::new();
         let headers = self.meshes.iter().flat_map(|(_, headers)| headers).flatten();
         let distinct = headers.filter(|header| known.insert(field_name(header)));
-        distinct.map(|header| header.payload_bytes().next_multiple_of(alignment)).sum()
+        let fields: u64 = distinct.map(|header| header.payload_bytes().next_multiple_of(alignment)).sum();
+        let node_bytes = channel_stride(self.options.occlusion_bands()) * self.options.storage.bytes();
+        let volumes = self.surfaces.groups.iter().filter_map(|group| group.volume.as_ref());
+        fields + volumes.map(|volume| (volume.nodes.count() * node_bytes) as u64).sum::<u64>()
     }
 
     /// Whether everything is in the cache, so that [`ensure()`] bakes nothing.
@@ -111,9 +119,16 @@ impl SceneNeeds {
         for group in self.surfaces.groups.iter().filter(|group| !cache.has_surfaces(group)) {
             missing.push((group.title(), group.vertex_count() as u32));
         }
+        for volume in self.surfaces.groups.iter().filter_map(|group| group.volume.as_ref()) {
+            if !cache.has_volume(volume) {
+                missing.push((VOLUME_TITLE.into(), volume.nodes.count() as u32));
+            }
+        }
         missing
     }
 }
+
+const VOLUME_TITLE: &str = "room between things at rest";
 
 fn field_title(mesh: &Mesh, header: &FieldHeader) -> String {
     let word = if header.kind == FieldKind::Radiance { "light" } else { "shadow" };
@@ -219,6 +234,7 @@ pub fn ensure(
     let mut surface_of = vec![0; count];
     let mut near = vec![Vec::new(); count];
     let mut rigid = Vec::new();
+    let mut volume = None;
     for group in &needs.surfaces.groups {
         let what = group.title();
         let (found, report) = cache.surfaces(group, &|now, all| progress(&what, now, all));
@@ -235,8 +251,16 @@ pub fn ensure(
             rigid.extend(group.entities.iter().map(|&entity| vec![entity]));
         }
         scene_surfaces.extend(found.iter().cloned());
+        if let Some(plan) = &group.volume {
+            let what = VOLUME_TITLE.to_owned();
+            let (found, report) = cache.volume(group, plan, &|now, all| progress(&what, now, all));
+            making.baked.extend(report.map(|report| Baked { what, report }));
+            let mut has = vec![false; count];
+            group.entities.iter().zip(group.occluders()).for_each(|(&entity, blocks)| has[entity] = blocks);
+            volume = (!found.blocked.is_empty()).then_some(SceneVolume { volume: found, has });
+        }
     }
     // What is held for further bakes is free for pictures.
     baker.rest();
-    Ok(BakedScene { meshes, surfaces: scene_surfaces, surface_of, near, rigid, baked: making.baked })
+    Ok(BakedScene { meshes, surfaces: scene_surfaces, surface_of, near, rigid, volume, baked: making.baked })
 }

@@ -39,6 +39,7 @@ pub mod silhouette;
 pub mod surface;
 pub mod surfaces;
 pub mod triangles;
+mod visibility_volume;
 
 use crate::asset::mesh::Mesh;
 use crate::error::{Error, Result};

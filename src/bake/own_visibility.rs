@@ -171,6 +171,12 @@ fn cells_of(side: usize) -> Vec<Cell> {
 
 static FEW_RAYS: LazyLock<Vec<PatternRay>> = LazyLock::new(|| rays(16));
 
+/// Directions all over the sphere, of equal solid angles.
+pub(super) fn sphere() -> impl Iterator<Item = DVec3> {
+    let upper = FEW_RAYS.iter().map(|ray| ray.local.as_dvec3());
+    upper.clone().chain(upper.map(|toward| -toward))
+}
+
 static MANY_RAYS: LazyLock<Pattern> = LazyLock::new(Pattern::new);
 
 /// A direction of the hemisphere about +z for a point of the unit square; equal areas stay equal.

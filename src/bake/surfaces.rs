@@ -7,6 +7,7 @@ use super::own_visibility::{Counts, Eye, Front, PATTERN, Rays, Seen, Standing, s
 use super::packet::{BlockerTriangle, Blockers, Mask};
 use super::refine::{Limits, Refined, refine};
 use super::triangles::{distinct, weights};
+use super::visibility_volume::VolumePlan;
 use super::{BakeReport, Options, Progress, TRANSFER_OFFSET, Wanted, bakes_transfer};
 use crate::asset::Mesh;
 use crate::asset::enclose::around_spheres;
@@ -39,9 +40,9 @@ const NUDGE: f32 = 0.02;
 const FAR: f64 = 0.65;
 /// Share of the blocked cosine-weighted hemisphere that shows backs of triangles, from a place inside a solid or below a
 /// sheet.
-const BURIED_BACKS: f64 = 0.5;
+pub(super) const BURIED_BACKS: f64 = 0.5;
 /// Share of it that is blocked there at least.
-const BURIED_BLOCKED: f64 = 0.35;
+pub(super) const BURIED_BLOCKED: f64 = 0.35;
 /// Places on the way from a buried vertex to the middle of a triangle where one that is not may be.
 const WAYS_OUT: [f32; 5] = [0.06, 0.15, 0.3, 0.5, 0.8];
 
@@ -74,6 +75,8 @@ pub struct GroupPlan {
     refinement: Option<(u32, bool)>,
     /// Name in the cache; `None` where nothing has to be baked.
     pub key: Option<String>,
+    /// What it blocks where other things move.
+    pub volume: Option<VolumePlan>,
 }
 
 /// A surface with its own visibility.
@@ -145,14 +148,22 @@ impl SurfacePlan {
             } else {
                 entities.iter().map(|&entity| member(entity, rest[entity])).collect()
             };
-            plans.push(GroupPlan { entities, members, wanted, bands: options.bands, refinement, key: None }.named());
+            let bands = options.bands;
+            let plan = GroupPlan { entities, members, wanted, bands, refinement, key: None, volume: None }.named();
+            let wanted = plan.moved_among(scene);
+            let volume = wanted.map(|wanted| VolumePlan::new(&plan.name(), wanted, options.occlusion_bands()));
+            plans.push(GroupPlan { volume, ..plan });
         }
         SurfacePlan { groups: plans }
     }
 
     /// Names of all that is baked: another scene with these names needs the same surfaces.
-    pub fn keys(&self) -> Vec<(&[usize], Option<&str>)> {
-        self.groups.iter().map(|group| (&group.entities[..], group.key.as_deref())).collect()
+    pub fn keys(&self) -> Vec<(&[usize], [Option<&str>; 2])> {
+        let with_keys = self.groups.iter().map(|group| {
+            let volume = group.volume.as_ref().map(|volume| &volume.key[..]);
+            (&group.entities[..], [group.key.as_deref(), volume])
+        });
+        with_keys.collect()
     }
 }
 
@@ -172,7 +183,7 @@ impl GroupPlan {
             refines: false,
         }];
         let bands = options.bands;
-        GroupPlan { entities: Vec::new(), members, wanted, bands, refinement: None, key: None }.named()
+        GroupPlan { entities: Vec::new(), members, wanted, bands, refinement: None, key: None, volume: None }.named()
     }
 
     fn named(mut self) -> Self {
@@ -212,6 +223,32 @@ impl GroupPlan {
             }
         }
         hasher.finalize().to_hex()[..32].to_owned()
+    }
+
+    /// The box in which lit things move that see several of the members; `None` where there are none.
+    fn moved_among(&self, scene: &Scene) -> Option<[DVec3; 2]> {
+        let blocks = self.occluders();
+        if !self.wanted.transfer || self.members.len() == 1 || blocks.iter().filter(|blocks| **blocks).count() < 2 {
+            return None;
+        }
+        let union = |[low, high]: [DVec3; 2], [from, to]: [DVec3; 2]| [low.min(from), high.max(to)];
+        // What may be put anywhere is looked for where more than a ground stands.
+        let is_flat = |member: &&Member| member.mesh.is_flat();
+        let all_flat = self.members.iter().all(|member| is_flat(&member));
+        let points = |member: &Member| {
+            let place = |p: &Vec3| member.placement.point(p.as_dvec3());
+            member.mesh.positions.iter().map(place).map(|place| [place; 2]).reduce(union)
+        };
+        let whole =
+            || self.members.iter().filter(|member| all_flat || !is_flat(member)).filter_map(points).reduce(union);
+        let moves = |entity: &usize| scene.entities[*entity].receives && !scene.is_at_rest(*entity);
+        let moving = (0..scene.data.entities.len()).filter(moves);
+        moving.filter_map(|entity| scene.reach(entity).or_else(whole)).reduce(union)
+    }
+
+    /// For each member whether it keeps light back, all of it.
+    pub(super) fn occluders(&self) -> Vec<bool> {
+        self.members.iter().map(|member| member.occludes).collect()
     }
 
     /// What people read.
@@ -298,9 +335,9 @@ impl GroupPlan {
 }
 
 /// The triangles of a group in a frame in which its bounding sphere is the unit sphere.
-struct Group<'p> {
+pub(super) struct Group<'p> {
     plan: &'p GroupPlan,
-    blockers: Blockers,
+    pub blockers: Blockers,
     centre: DVec3,
     radius_m: f64,
     standings: Vec<Standing>,
@@ -308,7 +345,7 @@ struct Group<'p> {
 }
 
 impl<'p> Group<'p> {
-    fn new(plan: &'p GroupPlan) -> Self {
+    pub fn new(plan: &'p GroupPlan) -> Self {
         let world: Vec<(DVec3, f64)> =
             plan.members.iter().map(|member| member.placement.sphere(member.mesh.bounding_sphere())).collect();
         let (centre, radius_m) = around_spheres(&world).unwrap_or((DVec3::ZERO, 1.0));
@@ -343,6 +380,11 @@ impl<'p> Group<'p> {
         let masks = plan.members.iter().map(mask).collect();
         let blockers = Blockers::new(triangles, masks, plan.members.iter().map(backs).collect());
         Group { plan, blockers, centre, radius_m, standings, spheres }
+    }
+
+    /// A place of the world in the group's frame.
+    pub fn place(&self, world: DVec3) -> Vec3A {
+        ((world - self.centre) / self.radius_m).as_vec3a()
     }
 
     fn space(&self, member: usize) -> GroupSpace<'_> {
@@ -409,7 +451,7 @@ impl GroupSpace<'_> {
     fn see_with(&self, position: Vec3, normal: Vec3, nudge: Vec3, rays: Rays, in_map: Option<&[bool]>) -> Seen {
         let group = self.group;
         let world = self.own().placement.point((position + nudge).as_dvec3());
-        let eye = Eye { origin: ((world - group.centre) / group.radius_m).as_vec3(), normal };
+        let eye = Eye { origin: group.place(world).into(), normal };
         let standing = &group.standings[self.member];
         let counts = Counts { blocks: &self.blocks, in_map };
         let mut seen = see(&group.blockers, standing, &eye, group.plan.bands, rays, counts);
@@ -430,10 +472,8 @@ impl GroupSpace<'_> {
             return false;
         }
         let off = nudge.dot(normal) * normal;
-        let [from, to] = [position - off, position + off].map(|place| {
-            let world = self.own().placement.point(place.as_dvec3());
-            ((world - group.centre) / group.radius_m).as_vec3a()
-        });
+        let [from, to] =
+            [position - off, position + off].map(|place| group.place(self.own().placement.point(place.as_dvec3())));
         let mut hits = Vec::with_capacity(1);
         let toward = (to - from).normalize_or_zero();
         group.blockers.first(from, &Mat3A::IDENTITY, &[toward], &self.others, &mut hits);

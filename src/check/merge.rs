@@ -115,6 +115,25 @@ pub fn against_twin(frame: &mut Frame, placements: &[Placement]) -> Result<Agree
     Ok(Agreement { worst, brightest })
 }
 
+/// A room that is open to the front, with a table, in which a ring moves.
+pub const ROOM: &str = r#"
+environment = { gradient = { radiance = [1, 0.9, 0.8] } }
+mesh = [
+    { name = "plane", plane = { size_m = 2, cells = 4 } },
+    { name = "top", cuboid = { size_m = [0.8, 0.06, 0.5], cells = 4 } },
+    { name = "ring", torus = { major_m = 0.15, minor_m = 0.07, segments = 24, sides = 12 } },
+]
+entity = [
+    { mesh = "plane" },
+    { mesh = "plane", position = [0, 2, 0], rotation = { axis = [1, 0, 0], angle_deg = 180 } },
+    { mesh = "plane", position = [0, 1, -1], rotation = { axis = [1, 0, 0], angle_deg = 90 } },
+    { mesh = "plane", position = [-1, 1, 0], rotation = { axis = [0, 0, 1], angle_deg = -90 } },
+    { mesh = "plane", position = [1, 1, 0], rotation = { axis = [0, 0, 1], angle_deg = 90 } },
+    { mesh = "top", position = [0.3, 0.6, -0.5] },
+    { mesh = "ring", position = [0, 1.1, 0], motion = [{ bob = { axis = [0.2, 0.1, 1], amplitude_m = 0.7, period_s = 4 } }] },
+]
+"#;
+
 /// A ring that lets light through, beside [`MIXED`].
 const GLASS: &str = "[[entity]]\nmesh = \"ring\"\nposition = [0.317, 0.413, 0.519]\nscale = 0.5\nopacity = 0.6\n";
 
@@ -122,14 +141,14 @@ const GLASS: &str = "[[entity]]\nmesh = \"ring\"\nposition = [0.317, 0.413, 0.51
 pub const LATTICES: [&str; 4] = ["cube:5x3,inner=0.5,outer=5", "cube:1x1", "cube:5x3,edges", "cube:4x5"];
 
 pub fn rows(baker: &Baker, add: &mut dyn FnMut(CheckRow)) -> Result<()> {
-    let scene = scene(&format!("{MIXED}{GLASS}"))?;
-    let placements = scene.at(0.0);
+    let mixed = scene(&format!("{MIXED}{GLASS}"))?;
+    let placements = mixed.at(0.0);
     // Fields are baked once for all rows, by the device under test; nothing is read from disk.
     let folder = tempfile::tempdir()
         .map_err(|error| crate::error::Error::Failed(format!("no folder for temporary files: {error}")))?;
     let cache = Cache::new(Some(folder.path()));
     let mut compare = |what: String, options: frame::Options| -> Result<()> {
-        let mut frame = Frame::new(baker, &cache, &scene, options, &|_, _, _| ())?;
+        let mut frame = Frame::new(baker, &cache, &mixed, options, &|_, _, _| ())?;
         let found = against_twin(&mut frame, &placements)?;
         let what = if options.variant.is_none_or(|v| v == frame.variant()) {
             what
@@ -156,6 +175,16 @@ pub fn rows(baker: &Baker, add: &mut dyn FnMut(CheckRow)) -> Result<()> {
     for lattice in LATTICES {
         let bake = bake::Options { lattice: lattice.parse().expect("a lattice in the table"), ..base.bake };
         compare(lattice.into(), frame::Options { bake, ..base })?;
+    }
+    let room = scene(ROOM)?;
+    let ring = room.entities.len() - 1;
+    let bake = bake::Options { groups: true, ..base.bake };
+    let mut frame = Frame::new(baker, &cache, &room, frame::Options { bake, ..base }, &|_, _, _| ())?;
+    for (what, z) in [("within a volume", 0.113), ("at the side of a volume", 0.987)] {
+        let mut placements = room.at(0.0);
+        placements[ring].position.z = z;
+        let found = against_twin(&mut frame, &placements)?;
+        add(CheckRow::new("merge", what, "of 1 + brightest", found.worst, ARITHMETIC));
     }
     Ok(())
 }

@@ -83,6 +83,29 @@ pub struct Corners {
     pub weight: [f64; 4],
 }
 
+impl Corners {
+    /// The corners of the tetrahedron around a place in a block of samples whose first has the number `first`: along each
+    /// axis the coordinate, how many cells there are, and how far apart the numbers of neighbours are.
+    pub fn new(mut first: u32, axes: [(f64, u32, u32); 3]) -> Self {
+        let mut steps = axes.map(|(at, cells, stride)| {
+            let low = (at.floor() as u32).min(cells - 1);
+            let within = at - f64::from(low);
+            // Counted from the sample of even number.
+            first += (low + low % 2) * stride;
+            let stride = i64::from(stride);
+            if low.is_multiple_of(2) { (within, stride) } else { (1.0 - within, -stride) }
+        });
+        steps.sort_by(|(a, _), (b, _)| b.total_cmp(a));
+        let [(most, by_most), (middle, by_middle), (least, by_least)] = steps;
+        let second = i64::from(first) + by_most;
+        let third = second + by_middle;
+        Corners {
+            index: [first, second as u32, third as u32, (third + by_least) as u32],
+            weight: [1.0 - most, most - middle, middle - least, least],
+        }
+    }
+}
+
 /// Coordinate in which shells are equally spaced; it grows inwards.
 fn chord(d: f64) -> f64 {
     (cap_height(d) / 2.0).sqrt()
@@ -200,27 +223,10 @@ impl Lattice {
         let t = (slope * self.coordinate(d.max(self.inner)) + offset).clamp(0.0, last);
         let (face, [x, y]) = self.place(direction);
         let columns = self.cells + 2;
-        let mut first = face * columns * columns;
-        let mut axis = |at: f64, cells: u32, stride: u32| {
-            let low = (at.floor() as u32).min(cells - 1);
-            let within = at - f64::from(low);
-            // Counted from the sample of even number.
-            first += (low + low % 2) * stride;
-            let stride = i64::from(stride);
-            if low.is_multiple_of(2) { (within, stride) } else { (1.0 - within, -stride) }
-        };
         // The shell beyond the only one weighs nothing.
         let shell_stride = if self.shells > 1 { self.stored_direction_count() } else { 0 };
         let axes = [(x, columns - 1, 1), (y, columns - 1, columns), (t, (self.shells - 1).max(1), shell_stride)];
-        let mut steps = axes.map(|(at, cells, stride)| axis(at, cells, stride));
-        steps.sort_by(|(a, _), (b, _)| b.total_cmp(a));
-        let [(most, by_most), (middle, by_middle), (least, by_least)] = steps;
-        let second = i64::from(first) + by_most;
-        let third = second + by_middle;
-        Corners {
-            index: [first, second as u32, third as u32, (third + by_least) as u32],
-            weight: [1.0 - most, most - middle, middle - least, least],
-        }
+        Corners::new(face * columns * columns, axes)
     }
 
     /// Checks counts and radii, and that what is stored goes with the spacing.

@@ -15,6 +15,7 @@ pub mod silhouette_header;
 pub mod silhouette_nodes;
 pub mod sub_light;
 mod text;
+pub mod visibility_volume;
 
 pub use area::Area;
 pub use fit::Fit;

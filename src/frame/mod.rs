@@ -126,6 +126,7 @@ impl Frame {
         let methods = methods(&scene, options.lights);
         let mut radiosity = RadiosityBuffers::new(device, &scene, &buffers)?;
         let wanted = permutation(&options, wanted, &scene, &methods, uniform_entities(device));
+        let wanted = MergePermutation { volume: buffers.volume.is_some(), ..wanted };
         let reflections = gloss::reflections(
             device,
             library,
@@ -189,7 +190,7 @@ impl Frame {
             radiosity.keep_direct()?;
         }
         let entity_room = entity_count.max(permutation.entity_limit as usize);
-        let mut sky = SkyLight::new(device, options.bake.bands)?;
+        let mut sky = SkyLight::new(device, options.bake.bands, buffers.volume_quads())?;
         sky.write(&scene, options.bake.bands)?;
         Ok(Frame {
             device: device.clone(),

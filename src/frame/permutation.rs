@@ -106,6 +106,7 @@ pub(super) fn permutation(
         skip: options.skip,
         lights: harmonic_lights(scene, methods),
         sheets: (0..scene.meshes.len()).any(|mesh| scene.caster(mesh).rectangle().is_some()),
+        volume: false,
         gloss: scene.entities.iter().any(|entity| entity.reflection().is_some()),
         entity_limit,
     }

@@ -32,6 +32,7 @@ impl Frame {
             scene_bounds: SceneBounds {
                 outlines: self.outlines_at(placements),
                 groups: Some(self.groups.clone()),
+                volume: self.buffers.volume.clone(),
                 ..SceneBounds::new(bounds, sky, self.options.skip, eps)
             },
             placements: placements.to_vec(),

@@ -11,8 +11,10 @@ use std::sync::Arc;
 
 /// The sky's projection on SH.
 pub(super) struct SkyLight {
-    /// For the merge: coefficients of one colour after the other, [`channel_stride`] floats apart.
+    /// For the merge: coefficients of one colour after the other, [`channel_stride`] floats apart, and then the quads of
+    /// the visibility volume, if there is one.
     pub coefficients: Upload,
+    volume: Option<[[f32; 4]; 2]>,
     /// Its largest radiance of any colour.
     pub brightest: f64,
     /// Its mean radiance, which pictures show behind the scene.
@@ -21,9 +23,10 @@ pub(super) struct SkyLight {
 
 impl SkyLight {
     /// A sky that has still to be written.
-    pub fn new(device: &Arc<Device>, bands: usize) -> Result<Self> {
-        let coefficients = Upload::new(device, "sky", 12 * channel_stride(bands) as u64)?;
-        Ok(SkyLight { coefficients, brightest: 0.0, background: Vec3::ZERO })
+    pub fn new(device: &Arc<Device>, bands: usize, volume: Option<[[f32; 4]; 2]>) -> Result<Self> {
+        let bytes = 12 * channel_stride(bands) + volume.as_ref().map_or(0, size_of_val);
+        let coefficients = Upload::new(device, "sky", bytes as u64)?;
+        Ok(SkyLight { coefficients, volume, brightest: 0.0, background: Vec3::ZERO })
     }
 
     /// Takes over a scene's environment.
@@ -36,6 +39,7 @@ impl SkyLight {
         }
         self.brightest = pose::brightest(&channels, bands);
         self.background = Vec3::from_array(channels.map(|c| (c[0] * Y00) as f32));
+        floats.extend(self.volume.iter().flatten().flatten());
         self.coefficients.write(&floats)
     }
 }

@@ -174,6 +174,12 @@ impl FrameTwin<'_> {
                 occluders: &occluders,
                 lights: &self.lights,
                 sky: (!scene.environment.is_none()).then_some(&self.sky),
+                volume: self
+                    .frame
+                    .buffers
+                    .volume
+                    .as_deref()
+                    .filter(|volume| self.frame.groups.moves_among(receiver.index, &volume.has)),
                 positions: &receiver.positions,
                 normals: &receiver.normals,
                 transfer: receiver.transfer.as_ref().map(|(floats, stride)| (&floats[..], *stride)),

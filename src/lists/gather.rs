@@ -26,6 +26,7 @@ pub fn compact(clusters: &[ClusterBounds]) -> bool {
 
 /// What may matter to any cluster of a group.
 pub struct Candidates {
+    receiver: u32,
     /// Occluders in the order in which they are multiplied ([`SceneBounds::order`]), the receiver left out.
     occluders: Vec<u32>,
     /// Lights in the order of entities, the receiver left out.
@@ -49,7 +50,7 @@ impl Candidates {
         occluders.retain(|&j| j != receiver);
         occluders.sort_by_cached_key(|&j| scene.order(receiver, j));
         let lights = scene.lights.iter().filter(|light| light.entity != receiver && keeps(light));
-        Candidates { occluders, lights: lights.copied().collect() }
+        Candidates { receiver, occluders, lights: lights.copied().collect() }
     }
 
     pub fn occluder_count(&self) -> usize {
@@ -115,20 +116,24 @@ fn walk(
             }
         }));
     };
-    let occlude =
-        |light: Option<u32>, sharp, results: &[CullResult], out: &mut Vec<u32>, tell: &mut dyn FnMut(_, _)| {
-            let occluders = candidates.occluders.iter().zip(views.iter().zip(results));
-            for (&entity, (view, &result)) in occluders.filter(|(j, _)| light != Some(**j)) {
-                let listed = result == CullResult::Listed;
-                let sheet = view.is_sheet();
-                let whole = (view.whole || sharp) && !sheet;
-                let cap = view.cap && !sharp && !sheet;
-                tell(if listed && !whole && !sheet { CullResult::Cap } else { result }, 1);
-                out.extend((listed && whole).then(|| ListEntry::Occlude { entity, light }.pack()));
-                out.extend((listed && sheet).then(|| ListEntry::Sheet { entity, light }.pack()));
-                out.extend((listed && cap).then(|| ListEntry::Cap { entity, light }.pack()));
-            }
-        };
+    let occlude = |light: Option<u32>,
+                   sharp,
+                   chosen: &dyn Fn(u32) -> bool,
+                   results: &[CullResult],
+                   out: &mut Vec<u32>,
+                   tell: &mut dyn FnMut(_, _)| {
+        let occluders = candidates.occluders.iter().zip(views.iter().zip(results));
+        for (&entity, (view, &result)) in occluders.filter(|(j, _)| light != Some(**j) && chosen(**j)) {
+            let listed = result == CullResult::Listed;
+            let sheet = view.is_sheet();
+            let whole = (view.whole || sharp) && !sheet;
+            let cap = view.cap && !sharp && !sheet;
+            tell(if listed && !whole && !sheet { CullResult::Cap } else { result }, 1);
+            out.extend((listed && whole).then(|| ListEntry::Occlude { entity, light }.pack()));
+            out.extend((listed && sheet).then(|| ListEntry::Sheet { entity, light }.pack()));
+            out.extend((listed && cap).then(|| ListEntry::Cap { entity, light }.pack()));
+        }
+    };
     let mut results = Vec::with_capacity(views.len());
     for light in &candidates.lights {
         let entity = light.entity;
@@ -143,7 +148,7 @@ fn walk(
         }
         tell(result, channels.into());
         if result == CullResult::Listed {
-            occlude(Some(entity), sharp, &results, out, &mut tell);
+            occlude(Some(entity), sharp, &|_| true, &results, out, &mut tell);
             out.extend((0..channels).map(|channel| {
                 let last = channel + 1 == channels;
                 ListEntry::Shine { entity, channel: light.coloured.then_some(channel), last }.pack()
@@ -159,7 +164,16 @@ fn walk(
     }
     if let Some(sky) = scope.scene().sky {
         chain(None, false, sky, &mut results);
-        occlude(None, false, &results, out, &mut tell);
+        let Some((volume, is_within)) = scope.volume() else {
+            occlude(None, false, &|_| true, &results, out, &mut tell);
+            return sharp_count;
+        };
+        let has = |j: u32| volume.has[j as usize];
+        let of_volume = candidates.occluders.iter().zip(&mut results).filter(|(j, _)| is_within && has(**j));
+        of_volume.for_each(|(_, result)| *result = CullResult::Own);
+        occlude(None, false, &has, &results, out, &mut tell);
+        out.push(ListEntry::Volume { receiver: candidates.receiver }.pack());
+        occlude(None, false, &|j| !has(j), &results, out, &mut tell);
     }
     sharp_count
 }

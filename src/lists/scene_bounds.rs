@@ -3,6 +3,7 @@
 
 use crate::field::sheet::Sheet;
 use crate::field::silhouette::SilhouetteField;
+use crate::field::visibility_volume::SceneVolume;
 use crate::lists::skip::Skip;
 use crate::lists::tree::Tree;
 use crate::scene::groups::Groups;
@@ -130,6 +131,8 @@ pub struct SceneBounds {
     pub skip: Skip,
     /// Which entities never move against each other; `None` where each is alone.
     pub groups: Option<Groups>,
+    /// What all that rests blocks where other things move.
+    pub volume: Option<Arc<SceneVolume>>,
     /// Radiance below which a contribution is left off; 0 leaves nothing off.
     pub eps: f32,
 }
@@ -157,6 +160,7 @@ impl SceneBounds {
         let tree = Tree::new(occluders.iter().map(|&j| (j, spheres[j as usize])));
         SceneBounds {
             groups: None,
+            volume: None,
             outlines: Vec::new(),
             tree,
             occluders,
@@ -213,7 +217,7 @@ pub struct Counts {
     pub passed_by: u64,
     /// Sharp lights of which one occluder covers all from the cluster, and occluders before them.
     pub covered: u64,
-    /// Occluders of the receiver's own group, whose shadows its own visibility has.
+    /// Occluders of the receiver's own group, whose shadows its own visibility has, and those of a visibility volume.
     pub own: u64,
     /// Occluders that stand on the list as a cap alone.
     pub caps: u64,

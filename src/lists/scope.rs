@@ -7,6 +7,7 @@
 use crate::field::sheet::{CONTACT, Sheet};
 use crate::field::silhouette::{INSIDE, REACH, Side};
 use crate::field::sub_light::NEAR_LIGHT_STEPS;
+use crate::field::visibility_volume::SceneVolume;
 use crate::layout;
 use crate::layout::{COSINE_LOBE, EVERYTHING};
 use crate::lists::scene_bounds::{ClusterBounds, EntityBounds, ListLight, SceneBounds};
@@ -16,6 +17,9 @@ use glam::{DVec2, DVec3};
 
 /// What an outline's distance may be off by, in r: more than the step of a map and what blending four of them errs by.
 const OUTLINE_MARGIN: f64 = 0.06;
+
+/// How far f32 may misplace a vertex against a visibility volume, metres.
+const VOLUME_MARGIN_M: f64 = 1e-4;
 
 /// Share of a vertex's view, times its albedo, below which the light that an entity reflects is left out.
 const LEAST_TAKEN: f64 = 1.0 / 96.0;
@@ -28,7 +32,7 @@ pub enum CullResult {
     Cap,
     /// No vertex sees it above its horizon.
     BelowHorizon,
-    /// It is of the receiver's group, whose shadows the receiver's own visibility has.
+    /// It is of the receiver's group, whose shadows the receiver's own visibility has; or the visibility volume has them.
     Own,
     /// It is farther than the light from every vertex.
     BehindLight,
@@ -194,6 +198,16 @@ impl<'m> Scope<'m> {
     pub fn is_own(&self, occluder: usize, sharp: bool) -> bool {
         self.scene.groups.as_ref().is_some_and(|groups| groups.is_own(self.index, occluder))
             && (!sharp || self.near.binary_search(&(occluder as u32)).is_ok())
+    }
+
+    /// The volume whose sky's shadows some vertex reads, and whether all vertices read nothing else of it.
+    pub fn volume(&self) -> Option<(&'m SceneVolume, bool)> {
+        let volume = self.scene.volume.as_deref()?;
+        let moves = self.scene.groups.as_ref()?.moves_among(self.index, &volume.has);
+        let nodes = &volume.volume.nodes;
+        let depth = nodes.depth(self.centre);
+        let reach = (self.radius_m + VOLUME_MARGIN_M) / f64::from(nodes.step_m);
+        (moves && depth > -reach).then_some((volume, depth > 1.0 + reach))
     }
 
     /// A sphere of the scene: centre in the world, radius.

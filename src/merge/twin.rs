@@ -1,6 +1,7 @@
 //! The CPU twin of "merge", in f64 and vertex by vertex, from the same stored numbers.
 
 use crate::field::sheet::{Sheet, SheetEye, SheetView};
+use crate::field::visibility_volume::SceneVolume;
 use crate::field::{Area, ShadowField};
 use crate::lists::skip::{CAP_SINES, CAP_SPREAD, CONES_MEET_RAD, SKIP_FADE_RAD, Skip};
 use crate::merge::chain::{ChainState, Multiplier};
@@ -42,6 +43,8 @@ pub struct MergeTwin<'t> {
     pub lights: &'t [usize],
     /// Red, green and blue of the distant light.
     pub sky: Option<&'t [Vec<f64>; 3]>,
+    /// What all that rests takes of the sky, where the receiver moves among it.
+    pub volume: Option<&'t SceneVolume>,
     /// Positions in the receiver's frame, metres from its sphere's centre.
     pub positions: &'t [DVec3],
     pub normals: &'t [DVec3],
@@ -99,8 +102,8 @@ impl MergeTwin<'_> {
             })
             .collect();
         // The chain of the occluders, each as much as `share` says.
-        let chain = |share: &dyn Fn(usize) -> f64| {
-            let mut state = multiplier.begin(&transfer[..count]);
+        let begun = multiplier.begin(&transfer[..count]);
+        let chain = |mut state: ChainState, share: &dyn Fn(usize) -> f64| {
             for (j, reach, b, cap) in &factors {
                 let share = reach * share(*j);
                 multiplier.multiply(&mut state, &b.map(|b| b * share));
@@ -113,12 +116,23 @@ impl MergeTwin<'_> {
 
         let mut sum = [0.0; 3];
         if let Some(sky) = self.sky {
-            let t = chain(&|j| if (self.leaves)(v, j, None) { 0.0 } else { 1.0 });
+            let counts = |j, chosen: bool| if !chosen || (self.leaves)(v, j, None) { 0.0 } else { 1.0 };
+            let t = match self.volume {
+                None => chain(begun, &|j| counts(j, true)),
+                Some(volume) => {
+                    let one_by_one = chain(begun, &|j| counts(j, volume.has[j]));
+                    let (share, blocked) = volume.volume.lookup(position, self.field_bands());
+                    let mut at_once = begun;
+                    multiplier.multiply(&mut at_once, &blocked);
+                    let mixed = std::array::from_fn(|k| one_by_one[k] + share * (at_once[k] - one_by_one[k]));
+                    chain(mixed, &|j| counts(j, !volume.has[j]))
+                }
+            };
             sum.iter_mut().zip(sky).for_each(|(sum, sky)| *sum += multiplier.meet(&t, sky));
         }
         for &light in self.lights.iter().filter(|&&l| l != self.receiver && !(self.leaves)(v, l, Some(l))) {
             let before = |j: usize| (cones[j].distance, j) < (cones[light].distance, light);
-            let t = chain(&|j| match sheet(j) {
+            let t = chain(begun, &|j| match sheet(j) {
                 _ if (self.leaves)(v, j, Some(light)) => 0.0,
                 Some(sheet) => {
                     let Cone { toward, distance, .. } = cones[light];

@@ -5,7 +5,7 @@ use crate::field::lattice::{CELL_WARP, Lattice};
 use crate::field::quantity::{Storage, channel_stride};
 use crate::field::sheet::CONTACT;
 use crate::gpu::Device;
-use crate::layout::{CLUSTER_VERTICES, DeviceEntity, ENTRY_BITS};
+use crate::layout::{ALIGNMENT, CLUSTER_VERTICES, DeviceEntity, ENTRY_BITS};
 use crate::lists::skip::{CAP_SINES, CAP_SPREAD, CONES_MEET_RAD, SKIP_FADE_RAD, Skip};
 use crate::merge::twin::BEHIND_SHEET;
 use crate::sh::basis::{Y00, coefficient_count};
@@ -105,6 +105,8 @@ pub struct MergePermutation {
     pub lights: bool,
     /// Whether any mesh is a sheet.
     pub sheets: bool,
+    /// Whether what moves reads all that rests at once.
+    pub volume: bool,
     /// Whether the transfer at the end of the sky's chain is kept, for surfaces that reflect.
     pub gloss: bool,
     /// Entities that uniform blocks hold on the device, [`uniform_entities`].
@@ -148,6 +150,8 @@ impl MergePermutation {
             .define("SHIFTED", self.packed() && self.variant.shifted)
             .define("LIGHTS", self.lights)
             .define("SHEETS", self.sheets)
+            .define("VOLUME", self.volume)
+            .define("VOLUME_UNIT", ALIGNMENT as u32 / (4 * self.storage.bytes() as u32))
             .define("KEEPS", self.gloss)
             .define("SHEET_COEFFICIENTS", coefficient_count(self.bands.min(POLYGON_BANDS)) as u32)
             .number("CONTACT", CONTACT)

@@ -129,6 +129,7 @@ impl Workload {
             skip: Skip::NONE,
             lights: false,
             sheets: false,
+            volume: false,
             entity_limit: self.entity_limit,
         }
     }

@@ -71,6 +71,11 @@ impl Groups {
         self.of[a] == self.of[b]
     }
 
+    /// Whether an entity moves against others, which are flagged and of one group.
+    pub fn moves_among(&self, entity: usize, others: &[bool]) -> bool {
+        others.iter().position(|other| *other).is_some_and(|other| !self.are_one(entity, other))
+    }
+
     /// The members of every group, in order.
     pub fn members(&self) -> Vec<Vec<usize>> {
         let mut members = vec![Vec::new(); self.of.len()];

@@ -23,7 +23,7 @@ use std::collections::{BTreeSet, HashMap};
 use std::path::Path;
 use std::sync::Arc;
 
-use glam::{DMat3, Vec3};
+use glam::{DMat3, DVec3, Vec3};
 use serde::Deserialize;
 use toml::Spanned;
 
@@ -365,6 +365,21 @@ impl Scene {
     /// Placements of all entities at `time_s` seconds, in order. They depend on the time alone, not on earlier frames.
     pub fn at(&self, time_s: f64) -> Vec<Placement> {
         self.data.entities.iter().map(|e| e.at(time_s)).chain(self.suns.iter().copied()).collect()
+    }
+
+    /// The box in the world that the bounding sphere of an entity stays in as it moves, metres; `None` where it may be
+    /// put anywhere.
+    pub(crate) fn reach(&self, entity: usize) -> Option<[DVec3; 2]> {
+        const TIMES: usize = 128;
+        let data = self.data.entities.get(entity).filter(|data| !data.motion.is_empty())?;
+        let spans = data.motion.iter().map(Motion::span_s);
+        let [from_s, to_s] = spans.fold([f64::MAX, f64::MIN], |[low, high], [from, to]| [low.min(from), high.max(to)]);
+        let sphere = self.meshes[self.entities[entity].mesh].bounding_sphere();
+        // Movements of several periods are at many places together.
+        let place = |i: usize| from_s + 2.0 * (to_s - from_s) * i as f64 / TIMES as f64;
+        let spheres = (0..=TIMES).map(|i| data.at(place(i)).sphere(sphere));
+        let boxes = spheres.map(|(centre, radius_m)| [centre - radius_m, centre + radius_m]);
+        boxes.reduce(|[low, high], [from, to]| [low.min(from), high.max(to)])
     }
 
     /// Replaces the data of an entity; its mesh stays the same.

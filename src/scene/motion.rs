@@ -164,6 +164,25 @@ pub enum Motion {
     Node(Box<Node>),
 }
 
+impl Motion {
+    /// From when to when, in seconds, it goes everywhere that it goes.
+    pub(super) fn span_s(&self) -> [f64; 2] {
+        match self {
+            Motion::Keyframes { keys, .. } => [keys[0].time_s, keys[keys.len() - 1].time_s],
+            Motion::Orbit { period_s, .. } | Motion::Spin { period_s, .. } | Motion::Bob { period_s, .. } => {
+                [0.0, period_s.abs()]
+            }
+            Motion::Node(node) => {
+                let position = node.position_keys.as_ref().map(|keys| &keys.times_s);
+                let rotation = node.rotation_keys.as_ref().map(|keys| &keys.times_s);
+                let scale = node.scale_keys.as_ref().map(|keys| &keys.times_s);
+                let times = || [position, rotation, scale].into_iter().flatten().flatten().copied();
+                [times().fold(0.0, f64::min), times().fold(0.0, f64::max)]
+            }
+        }
+    }
+}
+
 /// A node that carries what stands in it: what is placed in its space is scaled, turned and moved as it is.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]

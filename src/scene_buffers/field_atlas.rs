@@ -4,10 +4,12 @@ use super::ALIGNMENT;
 use crate::bake::{self, BakedMesh};
 use crate::error::Result;
 use crate::field::extent::{Extent, extent};
-use crate::field::quantity::channel_stride;
+use crate::field::quantity::{Storage, channel_stride};
+use crate::field::visibility_volume::VisibilityVolume;
 use crate::field::{Area, FieldHeader, FieldKind, ShadowField};
 use crate::gpu::{Buffer, BufferKind, Device};
 use crate::scene::Scene;
+use half::f16;
 use std::collections::HashMap;
 use std::ops::Range;
 use std::sync::Arc;
@@ -31,14 +33,23 @@ impl FieldSlot {
     }
 }
 
-/// Puts the fields of a scene's meshes into one buffer. Returns the places of each mesh's occlusion and radiance
-/// fields. Meshes that share a field share its place.
+/// The fields of a scene in one buffer.
+pub(super) struct FieldAtlas {
+    pub fields: Buffer,
+    /// The places of each mesh's occlusion and radiance fields. Meshes that share a field share its place.
+    pub slots: Vec<[Option<FieldSlot>; 2]>,
+    /// Where the visibility volume begins, in units of [`ALIGNMENT`].
+    pub volume_first: u32,
+}
+
+/// Puts the fields of a scene's meshes into one buffer, and its visibility volume after them.
 pub(super) fn field_atlas(
     device: &Arc<Device>,
     scene: &Scene,
     baked: &[BakedMesh],
+    volume: Option<&VisibilityVolume>,
     options: &bake::Options,
-) -> Result<(Buffer, Vec<[Option<FieldSlot>; 2]>)> {
+) -> Result<FieldAtlas> {
     let mut total = 0;
     let mut known = HashMap::<*const ShadowField, FieldSlot>::new();
     let mut distinct: Vec<(Arc<ShadowField>, u64)> = Vec::new();
@@ -57,6 +68,12 @@ pub(super) fn field_atlas(
         [&baked.blocked, &baked.radiance].map(|field| field.as_ref().map(|field| slot(field, &mesh.name)))
     });
     let slots = slots.collect();
+    let volume_at = total;
+    let payload = volume.map_or(Vec::new(), |volume| match options.storage {
+        Storage::F32 => bytemuck::cast_slice(&volume.blocked).to_vec(),
+        Storage::F16 => volume.blocked.iter().flat_map(|b| f16::from_f32(*b).to_le_bytes()).collect(),
+    });
+    let total = total + payload.len() as u64;
     // Where bands differ, the shader reads as much of any sample as the kind with more bands has. After the last sample
     // it reads on.
     let overrun = if options.field_bands.is_some() { 8 * channel_stride(options.most_bands()) as u64 } else { 0 };
@@ -64,7 +81,8 @@ pub(super) fn field_atlas(
     for (field, first) in distinct {
         fields.fill(first, &field.payload)?;
     }
-    Ok((fields, slots))
+    fields.fill(volume_at, &payload)?;
+    Ok(FieldAtlas { fields, slots, volume_first: (volume_at / ALIGNMENT) as u32 })
 }
 
 /// A copy of one field in host memory.

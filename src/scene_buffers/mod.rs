@@ -17,22 +17,21 @@ use crate::field::extent::Extent;
 use crate::field::quantity::channel_stride;
 use crate::field::self_visibility::{self, BYTES};
 use crate::field::sheet::Rectangle;
+use crate::field::visibility_volume::SceneVolume;
 use crate::gpu::{Buffer, Device, Texture};
+pub use crate::layout::ALIGNMENT;
 use crate::layout::{CLUSTER_VERTICES, NONE};
 use crate::lists::gather::ClusterBounds;
 use crate::lists::sight::TriangleRun;
 use crate::scene::groups::Groups;
 use crate::scene::{Lights, MapIndices, Scene};
+use field_atlas::FieldAtlas;
 pub use field_atlas::FieldSlot;
 use glam::DVec3;
 pub use silhouettes::{SilhouetteSlot, Silhouettes};
 use std::ops::Range;
 use std::sync::Arc;
 use textures::Content;
-
-/// Alignment, in bytes, of everything that a pass may bind as a range. It is the largest that Vulkan lets a device ask
-/// for.
-pub const ALIGNMENT: u64 = 256;
 
 /// A mesh of the scene as it shades and shines: its fields.
 pub struct DeviceMesh {
@@ -91,6 +90,10 @@ pub struct SceneBuffers {
     /// Positions and normals of all meshes, one quad for each.
     pub vertices: Buffer,
     pub meshes: Vec<DeviceMesh>,
+    /// What all that rests blocks where other things move.
+    pub volume: Option<Arc<SceneVolume>>,
+    /// Where it begins among the fields, in units of [`ALIGNMENT`].
+    volume_first: u32,
     pub surfaces: Vec<DeviceSurface>,
     /// The scene's textures; those that are equal are shared.
     pub textures: Vec<Arc<Texture>>,
@@ -159,7 +162,9 @@ impl Packing {
 impl SceneBuffers {
     /// Uploads what was baked of a scene with `options`, and its meshes.
     pub fn new(device: &Arc<Device>, scene: &Scene, options: &bake::Options, baked: BakedScene) -> Result<Self> {
-        let (fields, slots) = field_atlas::field_atlas(device, scene, &baked.meshes, options)?;
+        let volume = baked.volume.as_ref().map(|volume| &*volume.volume);
+        let FieldAtlas { fields, slots, volume_first } =
+            field_atlas::field_atlas(device, scene, &baked.meshes, volume, options)?;
         let (silhouettes, outlines) = Silhouettes::new(device, &baked.meshes)?;
         let casters = (0..scene.meshes.len()).map(|mesh| scene.caster(mesh));
         let meshes = casters.zip(slots).zip(outlines).map(|((caster, [blocked, radiance]), silhouette)| {
@@ -198,6 +203,8 @@ impl SceneBuffers {
             transfers: Buffer::with_data(device, "transfers", &transfers)?,
             vertices: Buffer::with_data(device, "vertices", &vertices)?,
             meshes,
+            volume: baked.volume.map(Arc::new),
+            volume_first,
             surfaces,
             textures: textures::upload(device, &scene.textures, |index| {
                 let is_number = |maps: MapIndices| maps.gloss == Some(index) || maps.normal == Some(index);
@@ -208,6 +215,14 @@ impl SceneBuffers {
             baked: baked.baked,
             bands: options.bands,
         })
+    }
+
+    /// The volume as `take_volume` in `glsl/merge.comp` reads it: the first node and 1 / step; how many nodes there are
+    /// along each axis, and where they begin.
+    pub fn volume_quads(&self) -> Option<[[f32; 4]; 2]> {
+        let nodes = self.volume.as_ref()?.volume.nodes;
+        let counts = nodes.counts.as_vec3().extend(self.volume_first as f32);
+        Some([nodes.low.extend(1.0 / nodes.step_m).to_array(), counts.to_array()])
     }
 
     /// Whether any surface has maps of self-visibility.

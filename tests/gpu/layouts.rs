@@ -40,6 +40,7 @@ fn merge() -> Vec<(Variant, Reflection)> {
         skip: Skip::ALL,
         lights: true,
         sheets: true,
+        volume: false,
         gloss: false,
         entity_limit: 48,
     };

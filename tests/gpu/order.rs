@@ -83,6 +83,7 @@ fn by_vertex(frame: &Frame, sorted: &Sort<'_>) -> (Vec<[f64; 3]>, BTreeMap<Vec<u
             occluders: &occluders,
             lights: &[LIGHT],
             sky: Some(&sky),
+            volume: None,
             positions: &[position],
             normals: &[normal],
             transfer: None,

@@ -3,6 +3,7 @@
 use crate::common::relative_rms;
 use crate::stage;
 use shadow_fields::bake::{self, Quality};
+use shadow_fields::check::merge::ROOM;
 use shadow_fields::frame;
 use shadow_fields::scene::{Lights, Scene};
 use shadow_fields::truth::{RayCast, RayMeshes, Vertex, World};
@@ -80,6 +81,37 @@ fn a_ball_along_a_wall_and_over_an_edge() {
     }
     assert!(worst < 0.03, "{worst}");
     assert!(pop < 0.02, "{pop}");
+}
+
+/// A ring between walls, by single fields and by their volume; and out of it, in steps of 1 cm.
+#[test]
+fn what_moves_in_a_room_sees_all_its_walls_at_once() {
+    let Some(stage) = stage() else { return };
+    let scene = scene(ROOM);
+    let ring = scene.entities.len() - 1;
+    let with = |groups: bool| {
+        let options = defaults(Lights::Sharp);
+        frame::Options { bake: bake::Options { groups, ..options.bake }, ..options }
+    };
+    let errors = |frame: &mut frame::Frame| [0.0, 0.4, 3.2].map(|t| error(&stage, frame, &scene, t, ring, 3));
+    let mut alone = stage.frame(&scene, with(false));
+    let mut frame = stage.frame(&scene, with(true));
+    let found = errors(&mut frame);
+    let by_fields = errors(&mut alone);
+    assert!(found.iter().all(|error| *error < 0.1), "{found:?}");
+    assert!(found.iter().zip(&by_fields).all(|(a, b)| *a < 0.6 * b), "{found:?}, by single fields {by_fields:?}");
+    let mut placements = scene.at(1.0);
+    let mut walk: Vec<Vec<[f32; 3]>> = Vec::new();
+    for _ in 0..60 {
+        placements[ring].position.z += 0.01;
+        walk.push(stage.light(&mut frame, &placements).swap_remove(ring));
+    }
+    let mut pop = 0.0_f64;
+    for step in walk.windows(3) {
+        let bend = |v: usize| f64::from(step[2][v][0] - 2.0 * step[1][v][0] + step[0][v][0]).powi(2);
+        pop = pop.max(((0..step[0].len()).map(bend).sum::<f64>() / step[0].len() as f64).sqrt());
+    }
+    assert!(pop < 0.01, "{pop}");
 }
 
 /// Balls of light beyond a wall, one that the wall's rim cuts, one below a ground, and a lamp that lies on a ceiling.

@@ -4,7 +4,7 @@
 //! Nothing of a group moves against it, so what a vertex sees is decided when its own visibility is baked, by the same
 //! rays. Each ray that meets a front has a share of the cosine-weighted hemisphere, and goes to the run of
 //! [`RUNS`]`[0]` vertices around the place that it meets. Runs that are too small as seen from the vertex become parts of
-//! larger ones, and all that light from a far wall takes is one link (Hanrahan, Salzman, Aupperle, *A Rapid Hierarchical
+//! larger ones, if those are seen too, and all that light from a far wall takes is one link (Hanrahan, Salzman, Aupperle, *A Rapid Hierarchical
 //! Radiosity Algorithm*, 1991). The sum of a vertex's links is the share of the hemisphere that shows fronts of the group.
 
 use std::ops::Range;
@@ -46,6 +46,11 @@ impl Runs {
 
     pub fn count(&self) -> u32 {
         self.count
+    }
+
+    /// The number of the run of a size that was met.
+    fn of(&self, size: usize, met: &[Met]) -> u32 {
+        self.firsts[met[0].member as usize][size] + met[0].place / RUNS[size] as u32
     }
 
     /// Numbers of the runs of one size, `RUNS[size]`, and what [`Runs::all`] has of each.
@@ -91,32 +96,10 @@ pub struct Met {
 pub fn links(mut met: Vec<Met>, runs: &Runs) -> Vec<u32> {
     met.sort_unstable_by_key(|met| (met.member, met.place));
     let mut links: Vec<(u32, f32)> = Vec::new();
-    let mut link = |member: u32, size: usize, place: u32, share: f32| {
-        links.push((runs.firsts[member as usize][size] + place / RUNS[size] as u32, share));
-    };
-    let is_one = |size: usize| {
-        move |a: &Met, b: &Met| a.member == b.member && a.place as usize / RUNS[size] == b.place as usize / RUNS[size]
-    };
-    let sum = |met: &[Met]| met.iter().map(|met| met.share).sum::<f32>();
-    for of_largest in met.chunk_by(is_one(2)) {
-        let first = of_largest[0];
-        let mut rest = 0.0;
-        for of_cluster in of_largest.chunk_by(is_one(1)) {
-            let mut rest_of_cluster = 0.0;
-            for of_smallest in of_cluster.chunk_by(is_one(0)) {
-                match sum(of_smallest) {
-                    share if share >= LEAST_SHARE => link(first.member, 0, of_smallest[0].place, share),
-                    share => rest_of_cluster += share,
-                }
-            }
-            match rest_of_cluster {
-                share if share >= LEAST_SHARE => link(first.member, 1, of_cluster[0].place, share),
-                share => rest += share,
-            }
-        }
-        if rest > 0.0 {
-            link(first.member, 2, first.place, rest);
-        }
+    const LARGEST: usize = RUNS.len() - 1;
+    for of_largest in met.chunk_by(|a, b| is_one(LARGEST, a, b)) {
+        let rest = join(LARGEST, of_largest, runs, &mut links);
+        links.extend(rest.filter(|rest| *rest > 0.0).map(|rest| (runs.of(LARGEST, of_largest), rest)));
     }
     if links.len() > MOST_LINKS {
         let all: f32 = links.iter().map(|(_, share)| share).sum();
@@ -126,6 +109,36 @@ pub fn links(mut met: Vec<Met>, runs: &Runs) -> Vec<u32> {
         links.iter_mut().for_each(|(_, share)| *share *= all / kept);
     }
     packed(&links)
+}
+
+fn is_one(size: usize, a: &Met, b: &Met) -> bool {
+    a.member == b.member && a.place as usize / RUNS[size] == b.place as usize / RUNS[size]
+}
+
+/// Links the parts of a run that was met, so far as it may not stand for them; then the share of all others. A run of
+/// which the rays met less than half of the parts stands for none: the others may be the far side of a wall, and all
+/// that is lit there would shine through it.
+fn join(size: usize, met: &[Met], runs: &Runs, links: &mut Vec<(u32, f32)>) -> Option<f32> {
+    if size == 0 {
+        return Some(met.iter().map(|met| met.share).sum());
+    }
+    let mut small = Vec::new();
+    let mut met_parts = 0;
+    let mut is_whole = true;
+    for part in met.chunk_by(|a, b| is_one(size - 1, a, b)) {
+        met_parts += 1;
+        let number = runs.of(size - 1, part);
+        match join(size - 1, part, runs, links) {
+            Some(share) if share >= LEAST_SHARE => links.push((number, share)),
+            Some(share) => small.push((number, share)),
+            None => is_whole = false,
+        }
+    }
+    if is_whole && 2 * met_parts >= runs.parts(runs.of(size, met)).len() {
+        return Some(small.into_iter().map(|(_, share)| share).sum());
+    }
+    links.extend(small);
+    None
 }
 
 /// Shares in whole steps, so that their sum stays.
@@ -184,5 +197,18 @@ mod tests {
         let within: f64 = (16..24).map(of).sum();
         assert!((of(cluster) + within - 200.0 / 700.0).abs() < 0.01, "the cluster or its runs");
         assert!(links.len() < 40, "{}", links.len());
+    }
+
+    /// Rays that meet one side of a run, which has another side in the dark, lead to that side alone.
+    #[test]
+    fn a_run_of_which_less_than_half_is_seen_stands_for_nothing() {
+        let runs = Runs::new([512]);
+        let met =
+            |places: u32| links((0..places).map(|i| Met { member: 0, place: 8 * i, share: 1e-3 }).collect(), &runs);
+        let largest = |links: Vec<u32>| links.iter().map(|link| link & ((1 << RUN_BITS) - 1)).max();
+        assert_eq!(largest(met(3)), Some(2));
+        assert_eq!(met(3).len(), 3);
+        // Four of eight clusters.
+        assert_eq!(largest(met(32)), Some(64 + 8));
     }
 }

@@ -17,6 +17,11 @@ use std::collections::{HashMap, HashSet};
 const LEAST_DIFFERENCE: f32 = 0.03;
 /// Length of the clamped cosine as a vector of four bands.
 const COSINE_LENGTH: f32 = 1.445;
+/// Difference that an edge counts as that passes through something, as a floor's below a wall between two rooms: what is
+/// to its two sides has nothing to do with each other, though both may see the same of the sky, or none.
+const CROSSED: f32 = 0.1;
+/// Cosine between the normals of an edge's ends above which a line from one to the other lies along the surface.
+const FLAT: f32 = 0.9999;
 /// Share of the vertices by which a round may grow a group, so that the worst edges are split first.
 const GROWTH: f64 = 0.35;
 
@@ -97,6 +102,7 @@ impl Refined {
         edges.retain(|edge| !self.middles.contains_key(edge) && self.length(*edge) > least_m);
         edges.sort_unstable();
         let transfer_of = |v: usize| self.transfers[v].as_ref().expect("rays are cast from every vertex above");
+        let positions_of = &self.positions;
         let middle = |&(a, b): &Edge| {
             let [a_index, b_index] = [a as usize, b as usize];
             let position = 0.5 * (self.positions[a_index] + self.positions[b_index]);
@@ -106,6 +112,10 @@ impl Refined {
             let ends = transfer_of(a_index).iter().zip(transfer_of(b_index));
             let squares = transfer.iter().zip(ends).map(|(middle, (a, b))| (middle - 0.5 * (a + b)).powi(2));
             let difference = if buried { 0.0 } else { squares.sum::<f32>().sqrt() / COSINE_LENGTH };
+            let is_flat = self.normals[a_index].dot(self.normals[b_index]) > FLAT;
+            let place = |v: usize| positions_of[v] + nudges[v];
+            let is_crossed = is_flat && space.is_between(place(a_index), place(b_index));
+            let difference = if is_crossed { difference.max(CROSSED) } else { difference };
             ((a, b), (transfer, difference))
         };
         let found: Vec<_> = edges.par_iter().map(middle).collect();

@@ -28,7 +28,7 @@ use std::sync::{Arc, OnceLock};
 use std::time::Instant;
 
 /// Counts in every name of the cache: another number where a bake of surfaces computes something else.
-const VERSION: u32 = 17;
+const VERSION: u32 = 18;
 /// How far towards the middle of its triangles a vertex is seen from, as a share of the way: the light of a crease is
 /// that just inside each face. Where meshes are left as they are, so are the places from which they are seen.
 const NUDGE: f32 = 0.02;
@@ -464,20 +464,25 @@ impl GroupSpace<'_> {
         seen
     }
 
+    /// Whether anything stands between two points of the member's frame.
+    pub fn is_between(&self, from: Vec3, to: Vec3) -> bool {
+        self.is_cut(&self.blocks, from, to)
+    }
+
+    /// The same of those members that count.
+    fn is_cut(&self, counts: &[bool], from: Vec3, to: Vec3) -> bool {
+        let [from, to] = [from, to].map(|place| self.group.place(self.own().placement.point(place.as_dvec3())));
+        let mut hits = Vec::with_capacity(1);
+        let toward = (to - from).normalize_or_zero();
+        self.group.blockers.first(from, &Mat3A::IDENTITY, &[toward], counts, &mut hits);
+        hits[0].is_some_and(|hit| hit.distance < from.distance(to))
+    }
+
     /// Whether another member lies on a point, as the ground on which it stands: between it and the place from which it is
     /// seen.
     fn is_covered(&self, position: Vec3, normal: Vec3, nudge: Vec3) -> bool {
-        let group = self.group;
-        if group.plan.members.len() == 1 {
-            return false;
-        }
         let off = nudge.dot(normal) * normal;
-        let [from, to] =
-            [position - off, position + off].map(|place| group.place(self.own().placement.point(place.as_dvec3())));
-        let mut hits = Vec::with_capacity(1);
-        let toward = (to - from).normalize_or_zero();
-        group.blockers.first(from, &Mat3A::IDENTITY, &[toward], &self.others, &mut hits);
-        hits[0].is_some_and(|hit| hit.distance < from.distance(to))
+        self.group.plan.members.len() > 1 && self.is_cut(&self.others, position - off, position + off)
     }
 
     /// The members that are so near a cluster, given by its vertices, that its maps have their shadows.

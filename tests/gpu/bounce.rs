@@ -200,6 +200,61 @@ fn a_panel_below_a_ceiling_hides_what_it_lights() {
     }
 }
 
+/// A lamp in one of two rooms with one floor, one ceiling and a door between them: the light of the other comes through
+/// the door alone, not past the wall's foot, and not from the far side of a wall that both rooms share.
+#[test]
+fn light_bounces_through_a_door_and_not_through_walls() {
+    let Some(stage) = stage() else { return };
+    let shell = generate::cuboid(Vec3::new(6.0, 2.6, 8.0), 1);
+    let inwards = shell.normals.iter().map(|normal| -*normal).collect();
+    let turned = shell.triangles.iter().map(|[a, b, c]| [*a, *c, *b]).collect();
+    let shell = Mesh::new("shell", shell.positions.clone(), inwards, None, turned).unwrap();
+    let stands = |mesh: &str, x: f32, y: f32| EntityData {
+        position: Vec3::new(x, y, 0.0),
+        albedo: Vec3::splat(0.7).into(),
+        ..EntityData::of_mesh(mesh)
+    };
+    let scene = Scene::builder()
+        .mesh("shell", shell)
+        .mesh("side", generate::cuboid(Vec3::new(2.5, 2.6, 0.15), 1))
+        .mesh("lintel", generate::cuboid(Vec3::new(1.0, 0.5, 0.15), 1))
+        .mesh("lamp", generate::sphere(0.15, 2))
+        .entity(stands("shell", 0.0, 0.0))
+        .entity(stands("side", -1.75, 0.0))
+        .entity(stands("side", 1.75, 0.0))
+        .entity(stands("lintel", 0.0, 1.05))
+        .entity(EntityData { position: Vec3::new(1.0, 0.6, -2.5), ..lamp() })
+        .build()
+        .unwrap();
+    let bake = bake::Options { vertices: 8000, ..usual(Bounces::One).bake };
+    let mut frame = stage.frame(&scene, frame::Options { bake, ..usual(Bounces::One) });
+    let placements = scene.at(0.0);
+    let light = stage.light(&mut frame, &placements);
+    let scene = frame.scene();
+    let mesh = scene.surface(0);
+    // Floor and ceiling of the dark room, as far as the lamp's rays do not come through the door.
+    let is_dark = |v: &Vertex| {
+        let [place, normal] = [mesh.positions[v.index], mesh.normals[v.index]];
+        v.entity == 0 && normal.y.abs() > 0.5 && place.z > 0.2 && place.x.abs() > 1.2
+    };
+    let dark: Vec<Vertex> = receiver_vertices(scene).into_iter().filter(is_dark).step_by(5).collect();
+    let shapes = RayMeshes::new(scene);
+    let world = World::new(scene, &shapes, &placements);
+    let rays = RayCast { rays: 2048, bounces: 1, ..RayCast::default() }.run(&world, &dark);
+    let sums = |of: &dyn Fn(usize) -> f64| (0..dark.len()).map(of).sum::<f64>();
+    let found = sums(&|i| f64::from(light[0][dark[i].index][0]));
+    let wanted = sums(&|i| rays[i].radiosity[0]);
+    assert!(
+        dark.len() > 50 && (found / wanted - 1.0).abs() < 0.3,
+        "{} vertices: {found}, by rays {wanted}",
+        dark.len()
+    );
+    let crosses = |[a, b]: [Vec3; 2]| a.z * b.z < 0.0 && a.x.abs().min(b.x.abs()) > 0.6 && a.distance(b) > 0.3;
+    let sides = mesh.triangles.iter().flat_map(|[a, b, c]| [[a, b], [b, c], [c, a]]);
+    let long = sides.filter(|side| crosses(side.map(|v| mesh.positions[*v as usize]))).count();
+    assert_eq!(long, 0, "triangles reach from one room into the other");
+}
+
 /// Nothing jumps where what a thing sees of the floor is cut otherwise: ten times smaller steps
 /// change light ten times less. (Steps of a millimetre: 0.012 of the brightest, under the ball.)
 #[test]

@@ -114,7 +114,8 @@ vec3 glossy(uint index, vec3 base, vec3 light, vec2 uv, float within) {
 // What a pixel emits, of what its vertices do.
 vec3 glow(uint index, vec3 by_vertex, vec3 factor, vec2 uv) {
 #if TEXTURED
-    return mix(by_vertex, factor * texture(emission_picture, uv).rgb, gloss_entity_at(index).factors.w);
+    GlossEntity entity = gloss_entity_at(index);
+    return mix(by_vertex, factor * entity.glow.rgb * texture(emission_picture, uv).rgb, entity.factors.w);
 #else
     return by_vertex;
 #endif

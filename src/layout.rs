@@ -169,6 +169,8 @@ shared_struct! {
         textured: u32,
         /// Factors on the textures: of roughness, metal, and the slope of normals; 1 where a texture has the emission.
         factors: [f32; 4],
+        /// What the texels of its emission are multiplied by.
+        glow: [f32; 4],
     }
 }
 

@@ -124,6 +124,7 @@ impl Frame {
                 mean_energy: if self.options.single_scatter { 0.0 } else { mean_energy(gloss.roughness) },
                 light_count: glossy.lights.iter().filter(|&&light| light != NONE).count().max(1) as u32,
                 textured: u32::from(entity.maps.any()),
+                glow: entity.maps.glow_scale.extend(0.0).to_array(),
                 factors: [factor.roughness, factor.metallic, 1.0, f32::from(u8::from(entity.maps.glow.is_some()))],
             };
         }
@@ -133,7 +134,7 @@ impl Frame {
     /// How the pixels of an entity reflect.
     pub(super) fn drawn_gloss(&self, entity: &Entity) -> Option<DrawnGloss<'_>> {
         let detail = detail(entity)?;
-        let MapIndices { gloss, normal, glow } = entity.maps;
+        let MapIndices { gloss, normal, glow, .. } = entity.maps;
         let texture = |index: Option<usize>| index.map(|index| &*self.buffers.textures[index]);
         Some(DrawnGloss { detail, maps: [gloss, normal, glow].map(texture) })
     }

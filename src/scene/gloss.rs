@@ -1,6 +1,7 @@
 //! How a surface reflects besides diffusely: the metallic-roughness model of glTF 2.0.
 
 use super::values;
+use glam::Vec3;
 use serde::{Deserialize, Serialize};
 
 /// Reflectance of a dielectric that is faced, for an index of refraction of 1.5.
@@ -59,8 +60,11 @@ pub struct MapIndices {
     pub gloss: Option<usize>,
     /// Normals.
     pub normal: Option<usize>,
-    /// A factor on the emission that is seen.
+    /// The emission that is seen.
     pub glow: Option<usize>,
+    /// What its texels are multiplied by: 1 over their mean on the mesh, which the emission stands for; 1 where the mesh
+    /// has colours of its own.
+    pub glow_scale: Vec3,
 }
 
 impl MapIndices {

@@ -328,6 +328,14 @@ impl Scene {
             * texture.map_or(1.0, |index| self.textures[index].opacity_at(&self.meshes[mesh], corners, weights))
     }
 
+    /// Emission of an entity at a place of a triangle of its mesh over the entity's own, by its map.
+    pub(crate) fn glow_at(&self, entity: usize, corners: [u32; 3], weights: [f32; 3]) -> Vec3 {
+        let Entity { mesh, maps, .. } = self.entities[entity];
+        let mesh = &self.meshes[mesh];
+        let Some(index) = maps.glow.filter(|_| mesh.colors.is_none()) else { return Vec3::ONE };
+        maps.glow_scale * Texture { factor: Vec3::ONE, ..(*self.textures[index]).clone() }.at(mesh, corners, weights)
+    }
+
     /// How an entity reflects at a place of a triangle of its mesh, whose normal there is `normal`, and the normal as its
     /// map tilts it.
     pub(crate) fn gloss_at(
@@ -516,7 +524,12 @@ fn coat(entity: &EntityData, data: &Data, textures: &[Arc<Texture>], mesh: &Mesh
         data.textures.iter().position(|texture| texture.name == *name && texture.file.is_some())
     };
     let Maps { gloss: varies, normal, glow } = &entity.maps;
-    let maps = MapIndices { gloss: number(varies), normal: number(normal), glow: number(glow) };
+    let glow = number(glow);
+    let glow_scale = glow.map_or(Vec3::ZERO, |index| {
+        let mean = || Texture { factor: Vec3::ONE, ..(*textures[index]).clone() }.mean(mesh).max(Vec3::splat(1e-6));
+        if mesh.colors.is_some() { Vec3::ONE } else { mean().recip() }
+    });
+    let maps = MapIndices { gloss: number(varies), normal: number(normal), glow, glow_scale };
     if let Some(texels) = maps.gloss.and_then(|index| textures[index].texels.as_ref()) {
         let [_, roughness, metallic] = texels.mean_bytes();
         gloss.roughness *= roughness;

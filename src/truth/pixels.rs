@@ -75,10 +75,11 @@ impl<'w> Eye<'w> {
     fn surface(&self, sight: &EntityView, direction: DVec3) -> Option<Seen> {
         let world = self.world;
         let entity = sight.entity;
-        let SurfaceHit { place, normal, over_mean, gloss, tilted, opacity } = world.surface_hit(sight, direction)?;
+        let SurfaceHit { place, normal, over_mean, glow, gloss, tilted, opacity } =
+            world.surface_hit(sight, direction)?;
         let emission = match world.scene.entities[entity].emission.as_dvec3() {
             DVec3::ZERO => DVec3::ZERO,
-            emission => emission * world.emission(sight, direction).unwrap_or(DVec3::ZERO),
+            emission => emission * glow * world.emission(sight, direction).unwrap_or(DVec3::ZERO),
         };
         let view = world.surface(entity, place, tilted);
         let ground = (world.entities[entity].rotation * normal).normalize();

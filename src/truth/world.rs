@@ -241,6 +241,7 @@ impl<'s> World<'s> {
             place: (sight.origin + distance * direction).as_dvec3(),
             normal,
             over_mean: self.scene.over_mean(sight.entity, corners, weights).as_dvec3(),
+            glow: self.scene.glow_at(sight.entity, corners, weights).as_dvec3(),
             gloss,
             tilted: tilted.as_dvec3(),
             opacity: f64::from(self.scene.opacity_at(sight.entity, corners, weights)),
@@ -300,6 +301,8 @@ pub struct SurfaceHit {
     pub normal: DVec3,
     /// Reflectance over the mean of the entity's, by colour.
     pub over_mean: DVec3,
+    /// Emission over the entity's.
+    pub glow: DVec3,
     /// How it reflects besides diffusely.
     pub gloss: Option<Gloss>,
     /// The normal as a map tilts it.

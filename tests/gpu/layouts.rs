@@ -71,6 +71,7 @@ fn glossy_entities() {
             light_count,
             textured,
             factors,
+            glow,
         }
     );
     assert_eq!(reflection.strides.get("GlossEntity"), Some(&(size_of::<GlossEntity>() as u32)));

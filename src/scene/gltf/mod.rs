@@ -19,7 +19,7 @@
 //! | alpha blending, transmission | opacity, of transmission less the luminance of what passes: glass is thin and grey |
 //! | roughness, metal, index of refraction, specular factor | gloss |
 //! | textures of roughness and metal, of normals | maps |
-//! | emissive factor and strength; texture | emission; colours of the mesh's vertices, and a map |
+//! | emissive factor and strength; texture | emission; of flat shapes the mean and a map, of others colours of the mesh's vertices, and a map |
 //! | point and spot lights | glowing balls; those of spots shine within a cone |
 //! | the first directional light | the sun of the distant light |
 //! | no light | daylight; a dim uniform sky beside lamps and suns |
@@ -550,7 +550,7 @@ impl Builder {
         let Surface { emission, gloss, maps, opacity, .. } = primitive.surface;
         let albedo = self.albedo(primitive);
         let [gloss_map, normal_map, glow_map] = maps.map(|map| map.map(|map| self.map(map)));
-        let has_pattern = primitive.surface.attributes.colors.is_some();
+        let has_pattern = primitive.surface.attributes.colors.is_some() || maps[2].is_some();
         EntityData {
             albedo,
             gloss,

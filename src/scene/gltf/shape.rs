@@ -224,11 +224,6 @@ impl Shape {
         let points: Vec<_> = self.positions.iter().map(|p| (place.transform_point3(p.as_dvec3()), 0.0)).collect();
         enclose::around_spheres(&points).unwrap_or_default()
     }
-
-    /// How many vertices there are.
-    pub fn vertex_count(&self) -> usize {
-        self.positions.len()
-    }
 }
 
 fn triangles(mode: Mode, corners: &[u32]) -> std::result::Result<Vec<[u32; 3]>, String> {

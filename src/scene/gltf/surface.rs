@@ -9,7 +9,7 @@ use glam::{Vec2, Vec3};
 use super::document::Document;
 use super::notes::Notes;
 use super::shape::Shape;
-use super::texture::{Applied, Textures};
+use super::texture::{Applied, Glow, Textures};
 use crate::asset::environment::RADIANCE_LIMIT;
 use crate::asset::mesh::Attributes;
 use crate::asset::texture::{Texture, Wrap};
@@ -144,11 +144,9 @@ impl Surface {
         if emission == Vec3::ZERO {
             maps[2] = None;
         } else if let Some(applied) = light {
-            let colors = textures.at_vertices(&applied);
-            if colors.len() == shape.vertex_count() {
-                attributes.colors = Some(colors);
-            } else {
-                emission *= colors[0];
+            match textures.glow(shape, &applied)? {
+                Glow::Even(color) => emission *= color,
+                Glow::Varied(colors) => attributes.colors = Some(colors),
             }
         }
         Ok(Surface { albedo, paint, gloss, has_backs, opacity, maps, emission, attributes })

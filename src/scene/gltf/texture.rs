@@ -5,14 +5,15 @@ use std::rc::Rc;
 use std::sync::Arc;
 
 use ::gltf::json::mesh::Semantic;
-use ::gltf::json::texture::{Info, Texture, WrappingMode};
+use ::gltf::json::texture::{Info, Texture as JsonTexture, WrappingMode};
 use ::gltf::json::validation::Checked;
-use glam::{Vec2, Vec3};
+use glam::{DMat3, Vec2, Vec3};
 
 use super::document::Document;
 use super::notes::Notes;
 use super::shape::Shape;
-use crate::asset::texture::{KTX2, Texels, Wrap};
+use crate::asset::mesh::Attributes;
+use crate::asset::texture::{KTX2, Texels, Texture, Wrap};
 use crate::error::Result;
 
 /// Largest width and height of a texture that vertices alone sample: larger ones are averaged down.
@@ -42,6 +43,14 @@ pub struct Applied {
     pub wrap: [Wrap; 2],
     /// Coordinates of the shape's vertices, v upwards, if it has any.
     pub uvs: Option<Vec<Vec2>>,
+}
+
+/// The light of a texture on a shape.
+pub enum Glow {
+    /// One colour.
+    Even(Vec3),
+    /// A colour for each vertex.
+    Varied(Vec<Vec3>),
 }
 
 impl Textures {
@@ -85,14 +94,19 @@ impl Textures {
         Ok(Some(Applied { image, texels, wrap, uvs }))
     }
 
-    /// Colours of a texture at the vertices of a shape; one for all where the shape has no coordinates for it, the
-    /// texture's mean.
-    pub fn at_vertices(&mut self, applied: &Applied) -> Vec<Vec3> {
-        let sampled = self.sampled(applied);
-        match &applied.uvs {
-            Some(uvs) => uvs.iter().map(|uv| sampled.at(*uv, applied.wrap).truncate()).collect(),
-            None => vec![sampled.mean()],
+    /// The light of a texture on a shape. A flat shape is one lamp, as a screen is, of the mean of what it shows.
+    pub fn glow(&mut self, shape: &Shape, applied: &Applied) -> Result<Glow> {
+        let texels = self.sampled(applied);
+        let Some(uvs) = &applied.uvs else { return Ok(Glow::Even(texels.mean())) };
+        let attributes = Attributes { uvs: applied.uvs.clone(), ..Default::default() };
+        let mesh = shape.mesh(&self.document, "", DMat3::IDENTITY, attributes, None)?;
+        if mesh.is_flat() {
+            let wrap = applied.wrap;
+            let texels = Some(texels);
+            let texture = Texture { texels, wrap, factor: Vec3::ONE, alpha_cutoff: None, alpha_blend: false };
+            return Ok(Glow::Even(texture.mean(&mesh)));
         }
+        Ok(Glow::Varied(uvs.iter().map(|uv| texels.at(*uv, applied.wrap).truncate()).collect()))
     }
 
     fn sampled(&mut self, applied: &Applied) -> Arc<Texels> {
@@ -141,7 +155,7 @@ impl Textures {
 }
 
 /// The image of a texture: that of an extension, where it is read.
-fn source(texture: &Texture) -> usize {
+fn source(texture: &JsonTexture) -> usize {
     let named = |name: &str| {
         let extension = texture.extensions.as_ref()?.others.get(name)?;
         usize::try_from(extension.get("source")?.as_u64()?).ok()

@@ -6,7 +6,7 @@ use super::{Global, output, silhouette};
 use crate::error::{Error, Result, one_line};
 use crate::field::file;
 use crate::field::silhouette::SILHOUETTE_MAGIC;
-use crate::field::{FieldKind, ShadowField, growth};
+use crate::field::{FieldKind, ShadowField};
 use crate::sh::basis::{MAX_COEFFICIENTS, coefficient_count, evaluate};
 use crate::sh::cube;
 use crate::text::{self, number, triple};
@@ -104,14 +104,6 @@ pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
     ];
     for (name, value) in lines {
         output::say(format!("{name:16} {value}"));
-    }
-    if header.kind == FieldKind::Occlusion {
-        output::say(format!(
-            "{:16} one product makes a transfer vector of {} bands at most {:.4} times as long",
-            "growth",
-            growth::TRANSFER_BANDS,
-            header.growth
-        ));
     }
     if header.kind == FieldKind::Radiance {
         output::say(format!("{:16} {}", "radiance scale", header.radiance_scale));

@@ -44,7 +44,7 @@ mod visibility_volume;
 use crate::asset::mesh::Mesh;
 use crate::error::{Error, Result};
 use crate::field::quantity::FieldKind;
-use crate::field::{FieldHeader, ShadowField, growth};
+use crate::field::{FieldHeader, ShadowField};
 use crate::gpu::{Access, Buffer, BufferKind, Commands, Device, Timing};
 use crate::sh::polygon::POLYGON_BANDS;
 use crate::shaders::Library;
@@ -183,10 +183,7 @@ impl Baker {
         header.captured_samples = captured.len() as u32;
         header.filled_samples = inside_count;
         let payload = self.assemble(&header, &values, &sources, &mut report)?;
-        let mut field = ShadowField { header, payload };
-        if !radiance {
-            field.header.growth = growth::growth(&field);
-        }
+        let field = ShadowField { header, payload };
         report.filled = inside_count;
         report.samples = field.header.lattice.sample_count() - inside_count;
         report.total = started.elapsed();

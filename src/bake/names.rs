@@ -15,7 +15,7 @@ pub(super) fn key(header: &impl Serialize) -> String {
 
 /// What decides a field: its header without the mesh's name and without what only the bake finds out.
 pub(super) fn identity(header: &FieldHeader) -> FieldHeader {
-    FieldHeader { mesh: String::new(), filled_samples: 0, captured_samples: 0, growth: 0.0, ..header.clone() }
+    FieldHeader { mesh: String::new(), filled_samples: 0, captured_samples: 0, ..header.clone() }
 }
 
 /// The name of a field in the cache. Fields with equal content have equal names.

@@ -120,7 +120,6 @@ pub fn header(mesh: &Mesh, kind: FieldKind, options: &Options) -> FieldHeader {
         level_texels: if kind == FieldKind::Occlusion { options.level_texels(mesh) } else { 0.0 },
         filled_samples: 0,
         captured_samples: 0,
-        growth: 0.0,
         centre_m: centre.to_array(),
         radius_m,
         radiance_scale: if kind == FieldKind::Radiance && mesh.colors.is_some() { brightest } else { 1.0 },

@@ -5,7 +5,6 @@ mod directions;
 pub mod extent;
 pub mod file;
 pub mod fit;
-pub mod growth;
 pub mod lattice;
 pub mod quantity;
 pub mod self_visibility;
@@ -45,9 +44,6 @@ pub struct FieldHeader {
     pub filled_samples: u32,
     /// Number of captured samples; the others lie at the same places, or see nothing and follow from their neighbours.
     pub captured_samples: u32,
-    /// Occlusion fields: largest factor by which one product lengthens a transfer vector (see [`growth`]), from the
-    /// stored numbers. It is 0 before the bake, and in radiance fields, which are not multiplied.
-    pub growth: f64,
     /// Centre of the bounding sphere in the mesh's own frame, metres.
     pub centre_m: [f32; 3],
     pub radius_m: f32,

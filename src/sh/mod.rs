@@ -14,7 +14,7 @@
 //! | [`quadrature`] | exact rules on the sphere |
 //! | [`cube`] | faces, texels, solid angles |
 //! | [`mod@project`] | texels to coefficients |
-//! | [`product`] | the triple-product tensor, products, growth certificates |
+//! | [`product`] | the triple-product tensor, products |
 //! | [`product_program`] | the product as straight-line code, and its GLSL |
 //! | [`rotation`] | block-diagonal rotation, and its GLSL |
 //! | [`lobe`] | closed forms: caps, spheres, the clamped cosine |

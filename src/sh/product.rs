@@ -126,17 +126,6 @@ impl Tensor {
         }
         out[..c_count].copy_from_slice(&sums[..c_count]);
     }
-
-    /// The row-major matrix M of multiplication by `b`: product = M a, with as many rows as the product has
-    /// coefficients. Symmetric where the first factor and the product have the same bands.
-    pub fn matrix(&self, b: &[f64]) -> Vec<f64> {
-        let [a_count, _, c_count] = self.bands.map(coefficient_count);
-        let mut matrix = vec![0.0; c_count * a_count];
-        for entry in &self.entries {
-            matrix[entry.k * a_count + entry.i] += entry.value * b[entry.j];
-        }
-        matrix
-    }
 }
 
 /// Groups the entries with `i <= j` by pair of factors; each also stands for its mirror image.
@@ -149,49 +138,4 @@ fn pair_up(entries: &[Entry]) -> (Vec<Pair>, Vec<(u8, f64)>) {
         pairs.push(Pair { i: run[0].i as u8, j: run[0].j as u8, end });
     }
     (pairs, targets)
-}
-
-/// Eigenvalues, ascending, of a symmetric row-major matrix, by cyclic Jacobi rotations (to about 1e-14 of the largest).
-/// Multiplying by a factor whose [`Tensor::matrix`] it is lengthens no expansion by more than the largest magnitude
-/// among them.
-pub fn eigenvalues(matrix: &[f64]) -> Vec<f64> {
-    let n = matrix.len().isqrt();
-    assert_eq!(n * n, matrix.len(), "the matrix must be square");
-    let mut a = matrix.to_vec();
-    let scale: f64 = a.iter().map(|x| x * x).sum();
-    // Convergence is quadratic: 16 bands of coefficients take five or six sweeps, 30 is a guard against non-numbers.
-    for _ in 0..30 {
-        let off: f64 = (0..n * n).filter(|i| i / n != i % n).map(|i| a[i] * a[i]).sum();
-        if off <= 1e-30 * scale {
-            break;
-        }
-        for p in 0..n {
-            for q in p + 1..n {
-                rotate_away(&mut a, n, [p, q]);
-            }
-        }
-    }
-    let mut values: Vec<f64> = (0..n).map(|i| a[i * n + i]).collect();
-    values.sort_by(f64::total_cmp);
-    values
-}
-
-/// One Jacobi rotation: makes a_pq zero.
-fn rotate_away(a: &mut [f64], n: usize, [p, q]: [usize; 2]) {
-    let off = a[p * n + q];
-    if off == 0.0 {
-        return;
-    }
-    let theta = (a[q * n + q] - a[p * n + p]) / (2.0 * off);
-    let tan = theta.signum() / (theta.abs() + (theta * theta + 1.0).sqrt());
-    let cos = 1.0 / (tan * tan + 1.0).sqrt();
-    let sin = tan * cos;
-    for row in a.chunks_exact_mut(n) {
-        (row[p], row[q]) = (cos * row[p] - sin * row[q], sin * row[p] + cos * row[q]);
-    }
-    for k in 0..n {
-        let pk = a[p * n + k];
-        let qk = a[q * n + k];
-        (a[p * n + k], a[q * n + k]) = (cos * pk - sin * qk, sin * pk + cos * qk);
-    }
 }

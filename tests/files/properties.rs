@@ -148,7 +148,6 @@ fn field(lattice: Lattice, seed: u64) -> ShadowField {
         level_texels: 0.0,
         filled_samples: 0,
         captured_samples: 0,
-        growth: 0.0,
         centre_m: [0.0; 3],
         radius_m: 1.0,
         radiance_scale: 1.0,

@@ -1,10 +1,8 @@
 //! The product tensor: counts, closed forms, quadrature of the pointwise product, the program that is printed as GLSL.
 
 use fastrand::Rng;
-use glam::DVec3;
-use shadow_fields::sh::basis::{Y00, coefficient_count, evaluate};
-use shadow_fields::sh::lobe::cap;
-use shadow_fields::sh::product::{Tensor, eigenvalues};
+use shadow_fields::sh::basis::{coefficient_count, evaluate};
+use shadow_fields::sh::product::Tensor;
 use shadow_fields::sh::product_program::product_program;
 use shadow_fields::sh::quadrature::sphere_rule;
 
@@ -64,53 +62,4 @@ fn the_program_that_is_printed_equals_the_product() {
             assert_close(&out, &expected, &format!("{a_bands} by {b_bands} bands"));
         }
     }
-}
-
-#[test]
-fn matrix_multiplies_as_the_product_does_and_is_symmetric() {
-    let mut rng = Rng::with_seed(7);
-    for b_bands in [4, 7] {
-        let tensor = Tensor::new(4, b_bands, 4);
-        let (a, b) = (random(&mut rng, 4), random(&mut rng, b_bands));
-        let matrix = tensor.matrix(&b);
-        let product: Vec<f64> = matrix.chunks(16).map(|row| row.iter().zip(&a).map(|(m, a)| m * a).sum()).collect();
-        assert_close(&product, &multiply(&tensor, &a, &b), "matrix");
-        for i in 0..16 {
-            for j in 0..i {
-                assert!((matrix[i * 16 + j] - matrix[j * 16 + i]).abs() < 1e-14);
-            }
-        }
-    }
-}
-
-#[test]
-fn eigenvalues_of_known_matrices() {
-    // A path of n masses: 2 - 2 cos(k pi / (n + 1)).
-    let n = 9;
-    let mut path = vec![0.0; n * n];
-    for i in 0..n {
-        path[i * n + i] = 2.0;
-        if i > 0 {
-            (path[i * n + i - 1], path[(i - 1) * n + i]) = (-1.0, -1.0);
-        }
-    }
-    let expected: Vec<f64> =
-        (1..=n).map(|k| 2.0 - 2.0 * (k as f64 * std::f64::consts::PI / (n + 1) as f64).cos()).collect();
-    assert_close(&eigenvalues(&path), &expected, "path");
-    assert_close(&eigenvalues(&[3.0, 0.0, 0.0, -5.0]), &[-5.0, 3.0], "diagonal");
-}
-
-/// The visibility of a 30 degree cap: 4 bands can grow by 1.058 a factor, 7 bands of visibility never.
-#[test]
-fn growth_certificate_of_a_cap() {
-    let visibility = |bands| {
-        let mut v: Vec<f64> = cap(bands, DVec3::new(0.6, 0.0, 0.8), 30.0_f64.to_radians());
-        v.iter_mut().for_each(|b| *b = -*b);
-        v[0] += 1.0 / Y00;
-        v
-    };
-    let grown = eigenvalues(&Tensor::new(4, 4, 4).matrix(&visibility(4)))[15];
-    assert!((grown - 1.058).abs() < 5e-4, "{grown}");
-    let bounded = eigenvalues(&Tensor::new(4, 7, 4).matrix(&visibility(7)));
-    assert!(bounded[0] > -1e-12 && bounded[15] < 1.0 + 1e-12, "{bounded:?}");
 }

@@ -61,8 +61,8 @@ pub struct Arguments {
     /// radiosity; default: the 99th percentile, rounded up
     #[arg(long, value_name = "X", value_parser = number::<f64>((Bound::Excluded(0.0), Bound::Unbounded)), requires = "error", allow_negative_numbers = true)]
     error_limit: Option<f64>,
-    /// Rays for the sky and for each light: 256 by default of every pixel with --reference, 1024 of every vertex with
-    /// --error
+    /// Rays for the sky and for each light, 8 to 1048576: 256 by default of every pixel with --reference, 1024 of every
+    /// vertex with --error
     #[arg(long, value_name = "N", requires = "judge", value_parser = clap::value_parser!(u32).range(8..=1 << 20))]
     rays: Option<u32>,
     #[command(flatten)]

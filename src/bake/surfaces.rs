@@ -150,8 +150,10 @@ impl SurfacePlan {
             };
             let bands = options.bands;
             let plan = GroupPlan { entities, members, wanted, bands, refinement, key: None, volume: None }.named();
-            let wanted = plan.moved_among(scene);
-            let volume = wanted.map(|wanted| VolumePlan::new(&plan.name(), wanted, options.occlusion_bands()));
+            let moved = plan.moved_among(scene);
+            let volume = moved.and_then(|(wanted, radius_m)| {
+                VolumePlan::new(&plan.name(), wanted, radius_m, options.occlusion_bands())
+            });
             plans.push(GroupPlan { volume, ..plan });
         }
         SurfacePlan { groups: plans }
@@ -225,8 +227,9 @@ impl GroupPlan {
         hasher.finalize().to_hex()[..32].to_owned()
     }
 
-    /// The box in which lit things move that see several of the members; `None` where there are none.
-    fn moved_among(&self, scene: &Scene) -> Option<[DVec3; 2]> {
+    /// The box in which lit things move that see several of the members, and the bounding radius of the largest, metres;
+    /// `None` where there are none.
+    fn moved_among(&self, scene: &Scene) -> Option<([DVec3; 2], f64)> {
         let blocks = self.occluders();
         if !self.wanted.transfer || self.members.len() == 1 || blocks.iter().filter(|blocks| **blocks).count() < 2 {
             return None;
@@ -242,8 +245,14 @@ impl GroupPlan {
         let whole =
             || self.members.iter().filter(|member| all_flat || !is_flat(member)).filter_map(points).reduce(union);
         let moves = |entity: &usize| scene.entities[*entity].receives && !scene.is_at_rest(*entity);
-        let moving = (0..scene.data.entities.len()).filter(moves);
-        moving.filter_map(|entity| scene.reach(entity).or_else(whole)).reduce(union)
+        let moving: Vec<usize> = (0..scene.data.entities.len()).filter(moves).collect();
+        let radius_m = |entity: &usize| {
+            let mesh = &scene.meshes[scene.entities[*entity].mesh];
+            f64::from(mesh.bounding_sphere().1) * f64::from(scene.data.entities[*entity].scale)
+        };
+        let largest_m = moving.iter().map(radius_m).fold(0.0, f64::max);
+        let wanted = moving.into_iter().filter_map(|entity| scene.reach(entity).or_else(whole)).reduce(union)?;
+        Some((wanted, largest_m))
     }
 
     /// For each member whether it keeps light back, all of it.

@@ -15,7 +15,7 @@ use std::time::Instant;
 /// Counts in every name of the cache: another number where a bake computes something else.
 const VERSION: u32 = 1;
 /// Most nodes of a volume.
-pub(super) const NODES: u32 = 10_000;
+const NODES: u32 = 10_000;
 /// So many members, each of which takes [`LEAST`] of the view, are seen on average where a volume is of use. Sky alone,
 /// relative RMS of what moves by single fields and by the volume: between walls (6 to 8 members) 0.20 to 0.46 and 0.05 to
 /// 0.08, in a garden (5) 0.06 and 0.025, past a post and a teapot on a floor (2) 0.012 and 0.020.
@@ -34,11 +34,15 @@ pub struct VolumePlan {
 }
 
 impl VolumePlan {
-    /// In a group of that name, around a box of the world.
-    pub fn new(group: &str, wanted: [DVec3; 2], bands: usize) -> Self {
+    /// In a group of that name, around a box of the world in which things up to that radius move. `None` where nodes
+    /// would be farther apart than that, as along a road through a town: then fields know more of what is near.
+    pub fn new(group: &str, wanted: [DVec3; 2], radius_m: f64, bands: usize) -> Option<Self> {
         let nodes = NodeBox::around(wanted, NODES);
+        if f64::from(nodes.step_m) > radius_m {
+            return None;
+        }
         let numbers = format!("{VERSION} {CROWD} {LEAST} {PROBE} {bands} {nodes:?} {group}");
-        VolumePlan { nodes, bands, key: blake3::hash(numbers.as_bytes()).to_hex()[..32].to_owned() }
+        Some(VolumePlan { nodes, bands, key: blake3::hash(numbers.as_bytes()).to_hex()[..32].to_owned() })
     }
 }
 
@@ -164,5 +168,19 @@ impl VolumePlan {
             stride,
             blocked: blocked(),
         })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn nodes_stand_closer_than_what_moves_is_large() {
+        let along = |length_m: f64| [DVec3::ZERO, DVec3::new(length_m, 1.0, 3.0)];
+        let plan = VolumePlan::new("room", along(5.0), 0.3, 4).expect("a volume");
+        assert!(plan.nodes.step_m < 0.3 && plan.nodes.count() <= NODES as usize);
+        assert!(VolumePlan::new("road", along(1000.0), 0.3, 4).is_none());
+        assert_ne!(plan.key, VolumePlan::new("hall", along(5.0), 0.3, 4).expect("a volume").key);
     }
 }

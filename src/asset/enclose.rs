@@ -34,10 +34,14 @@ pub fn bounding_sphere(positions: &[Vec3]) -> (Vec3, f32) {
     (centre, if radius_m > 0.0 { radius_m.next_up() } else { 0.0 })
 }
 
+/// The box around boxes, each its least and its greatest corner; `None` without any.
+pub fn around_boxes(boxes: impl Iterator<Item = [DVec3; 2]>) -> Option<[DVec3; 2]> {
+    boxes.reduce(|[low, high], [from, to]| [low.min(from), high.max(to)])
+}
+
 /// Centre and radius of a sphere around spheres, about the middle of their bounding box; `None` without any.
 pub fn around_spheres(spheres: &[(DVec3, f64)]) -> Option<(DVec3, f64)> {
-    let boxes = spheres.iter().map(|(centre, radius)| (*centre - *radius, *centre + *radius));
-    let (low, high) = boxes.reduce(|(low, high), (l, h)| (low.min(l), high.max(h)))?;
+    let [low, high] = around_boxes(spheres.iter().map(|(centre, radius)| [*centre - *radius, *centre + *radius]))?;
     let middle = (low + high) / 2.0;
     Some((middle, spheres.iter().map(|(centre, radius)| centre.distance(middle) + radius).fold(0.0, f64::max)))
 }

@@ -39,13 +39,13 @@ const EDGE_GAP: f32 = 0.01;
 const CLOSE: f32 = 0.07;
 
 #[derive(Clone, Copy)]
-struct PatternRay {
+pub(super) struct PatternRay {
     /// z along the normal.
-    local: Vec3A,
+    pub local: Vec3A,
     /// Cosine to the normal times solid angle.
     weight: f64,
     /// The SH basis times the weight, in the normal's frame.
-    share: [f32; MAX_COEFFICIENTS],
+    pub share: [f32; MAX_COEFFICIENTS],
 }
 
 impl PatternRay {
@@ -171,10 +171,11 @@ fn cells_of(side: usize) -> Vec<Cell> {
 
 static FEW_RAYS: LazyLock<Vec<PatternRay>> = LazyLock::new(|| rays(16));
 
-/// Directions all over the sphere, of equal solid angles.
-pub(super) fn sphere() -> impl Iterator<Item = DVec3> {
+/// Rays all over the sphere, each of which weighs its solid angle.
+pub(super) fn sphere() -> Vec<PatternRay> {
+    let solid_angle = TAU / FEW_RAYS.len() as f64;
     let upper = FEW_RAYS.iter().map(|ray| ray.local.as_dvec3());
-    upper.clone().chain(upper.map(|toward| -toward))
+    upper.clone().chain(upper.map(|toward| -toward)).map(|toward| PatternRay::new(toward, solid_angle)).collect()
 }
 
 static MANY_RAYS: LazyLock<Pattern> = LazyLock::new(Pattern::new);

@@ -102,7 +102,6 @@ impl Refined {
         edges.retain(|edge| !self.middles.contains_key(edge) && self.length(*edge) > least_m);
         edges.sort_unstable();
         let transfer_of = |v: usize| self.transfers[v].as_ref().expect("rays are cast from every vertex above");
-        let positions_of = &self.positions;
         let middle = |&(a, b): &Edge| {
             let [a_index, b_index] = [a as usize, b as usize];
             let position = 0.5 * (self.positions[a_index] + self.positions[b_index]);
@@ -113,9 +112,9 @@ impl Refined {
             let squares = transfer.iter().zip(ends).map(|(middle, (a, b))| (middle - 0.5 * (a + b)).powi(2));
             let difference = if buried { 0.0 } else { squares.sum::<f32>().sqrt() / COSINE_LENGTH };
             let is_flat = self.normals[a_index].dot(self.normals[b_index]) > FLAT;
-            let place = |v: usize| positions_of[v] + nudges[v];
-            let is_crossed = is_flat && space.is_between(place(a_index), place(b_index));
-            let difference = if is_crossed { difference.max(CROSSED) } else { difference };
+            let place = |v: usize| self.positions[v] + nudges[v];
+            let is_crossed = difference < CROSSED && is_flat && space.is_between(place(a_index), place(b_index));
+            let difference = if is_crossed { CROSSED } else { difference };
             ((a, b), (transfer, difference))
         };
         let found: Vec<_> = edges.par_iter().map(middle).collect();

@@ -10,7 +10,7 @@ use super::triangles::{distinct, weights};
 use super::visibility_volume::VolumePlan;
 use super::{BakeReport, Options, Progress, TRANSFER_OFFSET, Wanted, bakes_transfer};
 use crate::asset::Mesh;
-use crate::asset::enclose::around_spheres;
+use crate::asset::enclose::{around_boxes, around_spheres};
 use crate::asset::grid::Grid;
 use crate::asset::mesh::Attributes;
 use crate::asset::texture::Texture;
@@ -152,7 +152,8 @@ impl SurfacePlan {
             let plan = GroupPlan { entities, members, wanted, bands, refinement, key: None, volume: None }.named();
             let moved = plan.moved_among(scene);
             let volume = moved.and_then(|(wanted, radius_m)| {
-                VolumePlan::new(&plan.name(), wanted, radius_m, options.occlusion_bands())
+                let name = plan.key.clone().unwrap_or_else(|| plan.name());
+                VolumePlan::new(&name, wanted, radius_m, options.occlusion_bands())
             });
             plans.push(GroupPlan { volume, ..plan });
         }
@@ -234,16 +235,15 @@ impl GroupPlan {
         if !self.wanted.transfer || self.members.len() == 1 || blocks.iter().filter(|blocks| **blocks).count() < 2 {
             return None;
         }
-        let union = |[low, high]: [DVec3; 2], [from, to]: [DVec3; 2]| [low.min(from), high.max(to)];
         // What may be put anywhere is looked for where more than a ground stands.
         let is_flat = |member: &&Member| member.mesh.is_flat();
         let all_flat = self.members.iter().all(|member| is_flat(&member));
         let points = |member: &Member| {
             let place = |p: &Vec3| member.placement.point(p.as_dvec3());
-            member.mesh.positions.iter().map(place).map(|place| [place; 2]).reduce(union)
+            around_boxes(member.mesh.positions.iter().map(place).map(|place| [place; 2]))
         };
-        let whole =
-            || self.members.iter().filter(|member| all_flat || !is_flat(member)).filter_map(points).reduce(union);
+        let solid = || self.members.iter().filter(|member| all_flat || !is_flat(member));
+        let whole = || around_boxes(solid().filter_map(points));
         let moves = |entity: &usize| scene.entities[*entity].receives && !scene.is_at_rest(*entity);
         let moving: Vec<usize> = (0..scene.data.entities.len()).filter(moves).collect();
         let radius_m = |entity: &usize| {
@@ -251,7 +251,7 @@ impl GroupPlan {
             f64::from(mesh.bounding_sphere().1) * f64::from(scene.data.entities[*entity].scale)
         };
         let largest_m = moving.iter().map(radius_m).fold(0.0, f64::max);
-        let wanted = moving.into_iter().filter_map(|entity| scene.reach(entity).or_else(whole)).reduce(union)?;
+        let wanted = around_boxes(moving.into_iter().filter_map(|entity| scene.reach(entity).or_else(whole)))?;
         Some((wanted, largest_m))
     }
 

@@ -5,15 +5,14 @@ use super::surfaces::{BURIED_BACKS, BURIED_BLOCKED, Group, GroupPlan};
 use super::{BakeReport, Progress};
 use crate::field::quantity::channel_stride;
 use crate::field::visibility_volume::{NodeBox, VisibilityVolume};
-use crate::sh::basis::{MAX_COEFFICIENTS, coefficient_count, evaluate};
+use crate::sh::basis::coefficient_count;
 use glam::{DVec3, Mat3A, UVec3, Vec3A};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
-use std::f64::consts::PI;
 use std::time::Instant;
 
 /// Counts in every name of the cache: another number where a bake computes something else.
-const VERSION: u32 = 1;
+const VERSION: u32 = 2;
 /// Most nodes of a volume.
 const NODES: u32 = 10_000;
 /// So many members, each of which takes [`LEAST`] of the view, are seen on average where a volume is of use. Sky alone,
@@ -46,12 +45,6 @@ impl VolumePlan {
     }
 }
 
-struct Ray {
-    toward: Vec3A,
-    /// The SH basis times the solid angle.
-    share: [f64; MAX_COEFFICIENTS],
-}
-
 #[derive(Clone)]
 struct Node {
     blocked: Vec<f32>,
@@ -66,32 +59,24 @@ impl GroupPlan {
         let started = Instant::now();
         let group = Group::new(self);
         // The same rays leave every node, so that what is left of their error is smooth.
-        let directions: Vec<DVec3> = sphere().collect();
-        let solid_angle = 4.0 * PI / directions.len() as f64;
-        let ray = |toward: &DVec3| {
-            let mut basis = [0.0; MAX_COEFFICIENTS];
-            evaluate(plan.bands, *toward, &mut basis);
-            Ray { toward: toward.as_vec3a(), share: basis.map(|y| y * solid_angle) }
-        };
-        let rays: Vec<Ray> = directions.iter().map(ray).collect();
-        let toward: Vec<Vec3A> = rays.iter().map(|ray| ray.toward).collect();
+        let rays = sphere();
+        let toward: Vec<Vec3A> = rays.iter().map(|ray| ray.local).collect();
         let blocks = self.occluders();
         let stride = channel_stride(plan.bands);
+        let coefficients = coefficient_count(plan.bands);
         let look = |number: u32| {
             let mut hits = Vec::with_capacity(rays.len());
             let origin = group.place(plan.nodes.node(number));
             group.blockers.first(origin, &Mat3A::IDENTITY, &toward, &blocks, &mut hits);
-            let mut sums = [0.0; MAX_COEFFICIENTS];
+            let mut blocked = vec![0.0; stride];
             let mut met = vec![0; blocks.len()];
             let mut behind = 0;
             for (ray, hit) in rays.iter().zip(&hits) {
                 let Some(hit) = hit else { continue };
-                sums.iter_mut().zip(&ray.share).for_each(|(sum, share)| *sum += share);
+                blocked[..coefficients].iter_mut().zip(&ray.share).for_each(|(sum, share)| *sum += share);
                 met[hit.member as usize] += 1;
                 behind += usize::from(hit.from_behind);
             }
-            let mut blocked = vec![0.0; stride];
-            blocked.iter_mut().zip(&sums[..coefficient_count(plan.bands)]).for_each(|(to, sum)| *to = *sum as f32);
             let share = |met: usize| met as f64 / rays.len() as f64;
             let all = met.iter().sum();
             let buried = share(all) > BURIED_BLOCKED && share(behind) > BURIED_BACKS * share(all);
@@ -143,31 +128,24 @@ fn fill(nodes: &mut [Node], counts: UVec3) {
     }
 }
 
-/// How a volume is kept in the cache; its coefficients are the payload.
+/// How a volume is kept in the cache; its coefficients are the payload, and all else follows from the plan.
 #[derive(Debug, PartialEq, Serialize, Deserialize)]
 pub(super) struct StoredVolume {
     key: String,
-    nodes: NodeBox,
-    stride: usize,
 }
 
 impl VolumePlan {
     pub(super) fn store(&self, volume: &VisibilityVolume) -> (StoredVolume, Vec<u8>) {
-        let header = StoredVolume { key: self.key.clone(), nodes: volume.nodes, stride: volume.stride };
-        (header, bytemuck::cast_slice(&volume.blocked).to_vec())
+        (StoredVolume { key: self.key.clone() }, bytemuck::cast_slice(&volume.blocked).to_vec())
     }
 
     /// What header and payload hold; `None` where they hold something else.
     pub(super) fn restore(&self, header: &StoredVolume, payload: &[u8]) -> Option<VisibilityVolume> {
-        let StoredVolume { nodes, stride, .. } = *header;
-        let floats = nodes.count().checked_mul(stride)?;
-        let fits = payload.is_empty() || payload.len() == 4 * floats;
+        let nodes = self.nodes;
+        let stride = channel_stride(self.bands);
+        let fits = payload.is_empty() || payload.len() == 4 * nodes.count() * stride;
         let blocked = || bytemuck::pod_collect_to_vec(payload);
-        (header.key == self.key && nodes == self.nodes && fits).then(|| VisibilityVolume {
-            nodes,
-            stride,
-            blocked: blocked(),
-        })
+        (header.key == self.key && fits).then(|| VisibilityVolume { nodes, stride, blocked: blocked() })
     }
 }
 

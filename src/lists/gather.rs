@@ -26,7 +26,6 @@ pub fn compact(clusters: &[ClusterBounds]) -> bool {
 
 /// What may matter to any cluster of a group.
 pub struct Candidates {
-    receiver: u32,
     /// Occluders in the order in which they are multiplied ([`SceneBounds::order`]), the receiver left out.
     occluders: Vec<u32>,
     /// Lights in the order of entities, the receiver left out.
@@ -50,7 +49,7 @@ impl Candidates {
         occluders.retain(|&j| j != receiver);
         occluders.sort_by_cached_key(|&j| scene.order(receiver, j));
         let lights = scene.lights.iter().filter(|light| light.entity != receiver && keeps(light));
-        Candidates { receiver, occluders, lights: lights.copied().collect() }
+        Candidates { occluders, lights: lights.copied().collect() }
     }
 
     pub fn occluder_count(&self) -> usize {
@@ -172,7 +171,7 @@ fn walk(
         let of_volume = candidates.occluders.iter().zip(&mut results).filter(|(j, _)| is_within && has(**j));
         of_volume.for_each(|(_, result)| *result = CullResult::Own);
         occlude(None, false, &has, &results, out, &mut tell);
-        out.push(ListEntry::Volume { receiver: candidates.receiver }.pack());
+        out.push(ListEntry::Volume { receiver: scope.index() as u32 }.pack());
         occlude(None, false, &|j| !has(j), &results, out, &mut tell);
     }
     sharp_count

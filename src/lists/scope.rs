@@ -184,6 +184,11 @@ impl<'m> Scope<'m> {
         }
     }
 
+    /// The receiver.
+    pub fn index(&self) -> usize {
+        self.index
+    }
+
     /// What the rule looks at.
     pub fn scene(&self) -> &'m SceneBounds {
         self.scene

@@ -27,6 +27,7 @@ use glam::{DMat3, DVec3, Vec3};
 use serde::Deserialize;
 use toml::Spanned;
 
+use crate::asset::enclose::around_boxes;
 use crate::asset::environment::{Environment, EnvironmentData};
 use crate::asset::pierce::pierced;
 use crate::asset::texture::{Texels, Texture};
@@ -386,8 +387,7 @@ impl Scene {
         // Movements of several periods are at many places together.
         let place = |i: usize| from_s + 2.0 * (to_s - from_s) * i as f64 / TIMES as f64;
         let spheres = (0..=TIMES).map(|i| data.at(place(i)).sphere(sphere));
-        let boxes = spheres.map(|(centre, radius_m)| [centre - radius_m, centre + radius_m]);
-        boxes.reduce(|[low, high], [from, to]| [low.min(from), high.max(to)])
+        around_boxes(spheres.map(|(centre, radius_m)| [centre - radius_m, centre + radius_m]))
     }
 
     /// Replaces the data of an entity; its mesh stays the same.

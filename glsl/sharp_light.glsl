@@ -390,6 +390,12 @@ vec3 chain_sum(Surface surface, Entity shining, bool open, uint first, uint coun
     uint b = light.fine >= 1.0 ? 1 : 0, last = light.fine <= 0.0 ? 0 : 4;
     uint j = i;
     float irradiance = 0.0;
+#if COLORS
+    bool has_colors = shining.radiance_base != NONE;
+    vec3 toward = to_object(shining, light.toward), across = to_object(shining, light.across);
+    vec3 down = to_object(shining, light.down), colored = vec3(0.0);
+    mat3x4 colors = lamp_colors(has_colors ? shining.radiance_base : 0, toward, light.sine);
+#endif
 #if SHOWN || PANELS
     open_share = 0.0;
 #endif
@@ -458,7 +464,7 @@ vec3 chain_sum(Surface surface, Entity shining, bool open, uint first, uint coun
 #if EDGES
         passed += dot(share, vec4(1.0));
 #endif
-        vec4 shines = vec4(shining.light_kind == LIGHT_BALL ? shining.light_share : 1.0);
+        vec4 shines = vec4(shining.light_kind == LIGHT_BALL ? shining.light_size : 1.0);
 #if OUTLINES
         if (!open) {
             // Of a light with an outline of its own, as much of each part shines as the outline covers.
@@ -467,6 +473,13 @@ vec3 chain_sum(Surface surface, Entity shining, bool open, uint first, uint coun
         }
 #endif
         irradiance += dot(share, shines);
+#if COLORS
+        EACH for (uint k = 0; k < 4; k++) {
+            vec2 place = part_place(light, block, k);
+            vec3 factor = max(vec4(place.x * across + place.y * down, 1.0) * colors, 0.0);
+            colored += share[k] * shines[k] * factor;
+        }
+#endif
         b++;
     } while (b <= last);
     i = j + 1;
@@ -488,7 +501,12 @@ vec3 chain_sum(Surface surface, Entity shining, bool open, uint first, uint coun
 #if LAMPS
     lamps += irradiance / PI;
 #endif
-    return irradiance * cone * shining.emission;
+#if COLORS
+    vec3 arriving = has_colors ? colored : vec3(irradiance);
+#else
+    float arriving = irradiance;
+#endif
+    return cone * shining.emission * arriving;
 }
 
 #if CONES

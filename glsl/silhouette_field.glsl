@@ -44,6 +44,11 @@ vec2 among_cells(uint face, vec3 toward) {
     return (cube_warped(face, toward, LEAST_AHEAD) + 1.0) * (0.5 * NODE_CELLS);
 }
 
+// Number of a cell's first node, by face, row and column.
+uint first_node(uint face, vec2 low) {
+    return (face * (NODE_CELLS + 1) + uint(low.y)) * (NODE_CELLS + 1) + uint(low.x);
+}
+
 NodeCell node_cell(uint field, vec3 toward) {
     NodeCell cell;
     cell.face = cube_face(toward);
@@ -53,9 +58,30 @@ NodeCell node_cell(uint field, vec3 toward) {
     // On a cube's edge the lines of both its faces have a kink: so neither axis counts there.
     vec2 border = min(at, NODE_CELLS - at);
     cell.eased = clamp(min(min(cell.middle, 1.0 - cell.middle), border.yx) / EASED, 0.0, 1.0);
-    cell.first = field + BOX_QUADS + 3 * ((cell.face * (NODE_CELLS + 1) + uint(cell.low.y)) * (NODE_CELLS + 1) + uint(cell.low.x));
+    cell.first = field + BOX_QUADS + 3 * first_node(cell.face, cell.low);
     return cell;
 }
+
+#if COLORS
+// The colours of a light in direction `toward` (object's frame) whose angular radius has that sine, over its mean: for
+// each channel the slope along that frame's axes, from the disc's middle to its rim, and the value in the middle.
+// `first` is their first quad. The twin is src/field/lamp_colors.rs.
+mat3x4 lamp_colors(uint first, vec3 toward, float sine) {
+    uint face = cube_face(toward);
+    vec2 at = among_cells(face, toward), low = clamp(floor(at), 0.0, NODE_CELLS - 1.0), f = at - low;
+    float shells = min(sine / SHELL_STEP, LAST_SHELL), shell = min(floor(shells), LAST_SHELL - 1.0);
+    const uint shell_quads = 3 * 6 * (NODE_CELLS + 1) * (NODE_CELLS + 1);
+    first += uint(shell) * shell_quads + 3 * first_node(face, low);
+    mat3x4 plane = mat3x4(0.0);
+    for (uint k = 0; k < 8; k++) {
+        uint node = first + 3 * ((k >> 1 & 1) * (NODE_CELLS + 1) + (k & 1)) + (k >> 2) * shell_quads;
+        float weight = ((k & 1) == 0 ? 1.0 - f.x : f.x) * ((k & 2) == 0 ? 1.0 - f.y : f.y)
+                     * (k < 4 ? 1.0 + shell - shells : shells - shell);
+        plane += weight * mat3x4(node_quad(node), node_quad(node + 1), node_quad(node + 2));
+    }
+    return plane;
+}
+#endif
 
 // Bilinear weights of a cell's nodes for a direction near the one in the middle. They have no step where the cell
 // changes.

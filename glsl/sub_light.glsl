@@ -9,7 +9,7 @@ struct SeenLight {
     float fine;     // share of the four fine blocks
 #if PANELS
     uint kind;
-    float ratio;    // of a rectangle's edges
+    float ratio;    // of a rectangle's edges, second over first
     vec3 facing;    // unit normal of a panel's side that shines, by the axes above
     mat2x3 half_edges; // from its middle to the middles of two edges, by the axes above, metres
     float area;     // square metres
@@ -24,8 +24,9 @@ struct Block {
 };
 
 #if PANELS
+// A tube is the rectangle about its axis that faces whoever sees it.
 bool is_rectangle(SeenLight light) {
-    return light.kind == LIGHT_RECTANGLE || light.kind == LIGHT_SHEET;
+    return light.kind >= LIGHT_RECTANGLE;
 }
 
 bool is_panel(SeenLight light) {
@@ -56,15 +57,18 @@ SeenLight seen_light(vec3 to, Entity shining) {
 #if PANELS
     light.kind = shining.light_kind;
     light.ratio = shining.light_ratio;
-    bool rectangle = is_rectangle(light);
-    vec2 edges = vec2(1.0, light.ratio) * inversesqrt(1.0 + light.ratio * light.ratio);
-    vec2 radii = (rectangle ? edges : vec2(sqrt(shining.light_share))) / shining.centre.w;
+    bool rectangle = is_rectangle(light), tube = light.kind >= LIGHT_TUBE;
+    vec2 radii = (rectangle ? shining.light_size * vec2(1.0, light.ratio) : vec2(sqrt(shining.light_size))) / shining.centre.w;
     mat3 axes = mat3(light.toward, light.across, light.down);
-    light.facing = to_world(shining, vec3(0.0, 1.0, 0.0)) * axes;
+    vec3 along = vec3(equal(uvec3(tube ? light.kind : LIGHT_TUBE), LIGHT_TUBE + uvec3(0, 1, 2)));
+    along = to_world(shining, along) * axes;
+    vec3 beside = cross(along, vec3(1.0, 0.0, 0.0));
+    beside = tube ? beside / max(length(beside), 1e-6) : to_world(shining, vec3(0.0, 0.0, 1.0)) * axes;
+    light.facing = tube ? cross(along, beside) : to_world(shining, vec3(0.0, 1.0, 0.0)) * axes;
     // Of two sides that shine, the one that is seen.
     light.facing *= light.kind == LIGHT_SHEET && light.facing.x > 0.0 ? -1.0 : 1.0;
-    light.half_edges[0] = radii.x * (to_world(shining, vec3(1.0, 0.0, 0.0)) * axes);
-    light.half_edges[1] = radii.y * (to_world(shining, vec3(0.0, 0.0, 1.0)) * axes);
+    light.half_edges[0] = radii.x * along;
+    light.half_edges[1] = radii.y * beside;
     light.area = radii.x * radii.y * (rectangle ? 4.0 : PI);
 #endif
     return light;

@@ -66,6 +66,8 @@ shared_struct! {
         alpha_beta: [f32; 4],
         gamma: [f32; 2],
         blocked_base: u32,
+        /// First quad of its radiance field; of a sharp light that of its colours among the nodes of silhouettes, or
+        /// [`NONE`] where it has one colour.
         radiance_base: u32,
         /// Slope and offset of the shell coordinate, inner and outer shell radius in r.
         radial: [f32; 4],
@@ -90,9 +92,9 @@ shared_struct! {
         silhouette: u32,
         /// Shape of its sharp light: a [`LightKind`].
         light_kind: u32,
-        /// Ball or disc: the share of its bounding sphere's disc that shines.
-        light_share: f32,
-        /// Rectangle: its edge along z over that along x.
+        /// Ball or disc: the share of its bounding sphere's disc that shines. Rectangle or tube: half its first edge, in r.
+        light_size: f32,
+        /// Rectangle: its edge along z over that along x. Tube: its width over its length.
         light_ratio: f32,
         /// Spot, which shines along its own +y: [`crate::scene::light::Spot::ramp`]. 0 and 1 for any other light.
         light_ramp: [f32; 2],
@@ -190,6 +192,10 @@ pub enum LightKind {
     Rectangle,
     /// A rectangle that shines from both sides.
     Sheet,
+    /// A tube along the object's x axis; then along y, and along z.
+    TubeX,
+    TubeY,
+    TubeZ,
 }
 
 /// The text of a generated include that declares or reads shared structs.
@@ -330,7 +336,7 @@ pub const TAG_STEP: f32 = 1.0 / 255.0;
 pub const COSINE_LOBE: [f64; 3] = [0.09375, 0.5, 0.46875];
 
 /// The macros that every shader has: what both languages have to agree on.
-pub fn shared_macros() -> [(&'static str, String); 15] {
+pub fn shared_macros() -> [(&'static str, String); 16] {
     let [a, b, c] = COSINE_LOBE;
     let kind = |kind: LightKind| format!("{}u", kind as u32);
     [
@@ -349,5 +355,6 @@ pub fn shared_macros() -> [(&'static str, String); 15] {
         ("LIGHT_DISC", kind(LightKind::Disc)),
         ("LIGHT_RECTANGLE", kind(LightKind::Rectangle)),
         ("LIGHT_SHEET", kind(LightKind::Sheet)),
+        ("LIGHT_TUBE", kind(LightKind::TubeX)),
     ]
 }

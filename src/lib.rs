@@ -3,8 +3,7 @@
 //! Method: Zhou, Hu, Lin, Guo, Shum, *Precomputed Shadow Fields for Dynamic Scenes*, SIGGRAPH 2005. Around every
 //! object, cube maps are captured at points on concentric shells and projected to spherical harmonics (SH): an
 //! occlusion field for what the object blocks, a radiance field for what it emits. At run time every vertex merges
-//! these fields by SH products. Lights of one colour are sharp lights: they look up silhouette fields, which keep the
-//! edges of shadows.
+//! these fields by SH products. Lamps are sharp lights: they look up silhouette fields, which keep the edges of shadows.
 //!
 //! # Conventions
 //!
@@ -23,17 +22,18 @@
 //!   Samples are lowered by a twelfth of their second differences. Beyond 8 r the value falls as (8r/d)^2.
 //! - Order: an occluder precedes a light if its bounding sphere's centre is nearer to the vertex than the light's.
 //!   Entity indices decide ties. A sheet precedes what lies beyond its plane.
-//! - Sharp lights: an entity that glows in one colour, or from one flat side, is a sharp light. It is cut into 4 or 16
-//!   parts ([`field::sub_light`]); in each, the visibilities past all occluders' outlines ([`field::silhouette`]) and
-//!   past the receiver's own mesh ([`field::self_visibility`]) are multiplied. What lies beyond the light's surface
-//!   blocks nothing. All else goes through SH.
+//! - Sharp lights: an entity that glows is a sharp light: a ball, a disc, a rectangle, a tube, or whatever its outline
+//!   is. It is cut into 4 or 16 parts ([`field::sub_light`]); in each, the visibilities past all occluders' outlines
+//!   ([`field::silhouette`]) and past the receiver's own mesh ([`field::self_visibility`]) are multiplied. What lies
+//!   beyond the light's surface blocks nothing. Where the light has several colours, each part has its own
+//!   ([`field::lamp_colors`]). The sky goes through SH, and all light with `--lights sh`.
 //! - Small occluders: an occluder whose bounding sphere has a half-angle below 12 degrees blocks a point. It takes away
 //!   the chain's value in its direction times the solid angle of a projected area, which is fitted to its outermost
 //!   shell ([`field::Area`]). Up to 16 degrees the point and the field share.
 //! - Rigid groups: entities without motion are one group. A vertex's own visibility is cast by rays past its whole
 //!   group, so members leave each other's chains; under sharp lights a member that is convex, or farther than 0.65 of
 //!   its bounding radii, keeps its silhouette. What moves among many of them reads the sky past all at once, from nodes
-//!   of the box in which it moves ([`field::visibility_volume`]). In a scene with lights in bands, and without the skip
+//!   of the box in which it moves ([`field::visibility_volume`]). With `--lights sh`, and without the skip
 //!   `static`, every entity is alone.
 //! - Surfaces: a mesh is lit and drawn with more vertices where its own visibility varies ([`bake::surfaces`]).
 //! - Entities: everything receives, and everything but emitters occludes. Each can be set per entity. Scales are uniform

@@ -5,7 +5,7 @@ use glam::{DVec3, Vec2, Vec3};
 use super::{enclose, outline, topology};
 use crate::error::{Error, Result};
 use crate::field::sheet::Rectangle;
-use crate::field::sub_light::LampFace;
+use crate::field::sub_light::{LampFace, TUBE};
 
 /// Largest number of triangles of a mesh: 48 MB of indices, and edge tables of about 200 MB while it is checked.
 pub const TRIANGLE_LIMIT: usize = 4_000_000;
@@ -157,7 +157,9 @@ impl Mesh {
             two_sided: false,
         };
         mesh.rectangle = outline::rectangle(&mesh);
-        mesh.panel = mesh.rectangle.filter(|_| mesh.colors.is_none()).and_then(|rectangle| rectangle.as_lamp());
+        if mesh.colors.is_none() {
+            mesh.panel = mesh.rectangle.map_or_else(|| mesh.tube(), |rectangle| rectangle.as_lamp());
+        }
         Ok(mesh)
     }
 
@@ -238,8 +240,24 @@ impl Mesh {
         is_ball.then(|| self.area_m2() / (4.0 * std::f64::consts::PI * radius * radius))
     }
 
+    /// The tube that the mesh is: convex, along one of its axes, and at most twice as wide as thick. Around all of its
+    /// width it is as wide on average as its area says.
+    fn tube(&self) -> Option<LampFace> {
+        let places = || self.positions.iter().copied();
+        let size = places().fold(Vec3::MIN, Vec3::max) - places().fold(Vec3::MAX, Vec3::min);
+        let axis = size.max_position();
+        let [a, b] = [size[(axis + 1) % 3], size[(axis + 2) % 3]];
+        if a.max(b) > 2.0 * a.min(b) || !self.is_convex() {
+            return None;
+        }
+        // Of a cylinder of that length and area.
+        let share = self.area_m2() / (std::f64::consts::TAU * f64::from(size[axis]).powi(2));
+        let radius = ((1.0 + 4.0 * share).sqrt() - 1.0) / 2.0;
+        (radius <= TUBE).then_some(LampFace::Tube { axis, radius })
+    }
+
     /// The face that shines, of a flat lamp: of a body that shines from one side, or of a rectangle in one colour at
-    /// right angles to +y whose edges run along x and z.
+    /// right angles to +y whose edges run along x and z; and of a tube.
     pub fn panel(&self) -> Option<LampFace> {
         self.panel
     }

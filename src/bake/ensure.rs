@@ -6,6 +6,7 @@ use super::surfaces::{BakedSurface, SurfacePlan};
 use super::{BakeReport, Baker, Options, Progress, Wanted, header};
 use crate::asset::Mesh;
 use crate::error::Result;
+use crate::field::lamp_colors::LampColors;
 use crate::field::quantity::channel_stride;
 use crate::field::silhouette::SilhouetteField;
 use crate::field::silhouette_nodes::NodeGrid;
@@ -35,6 +36,7 @@ pub struct BakedMesh {
     pub blocked: Option<Arc<ShadowField>>,
     pub radiance: Option<Arc<ShadowField>>,
     pub silhouette: Option<Arc<SilhouetteField>>,
+    pub lamp_colors: Option<Arc<LampColors>>,
 }
 
 /// Everything that is baked of a scene.
@@ -141,12 +143,13 @@ pub struct Needed {
     /// Occlusion and radiance field.
     pub fields: [Option<FieldKind>; 2],
     pub silhouette: bool,
+    pub lamp_colors: bool,
 }
 
 /// What the entities of a mesh need. An entity that only receives, or that nothing else can see, needs no field, and an
 /// occluder that is a rectangle none either.
 /// Without light no shadows are needed, without light in spherical harmonics occlusion fields of what moves alone,
-/// without sharp lights no silhouettes. A light of one colour needs no radiance field. What only members of its own group
+/// without sharp lights no silhouettes. A sharp light needs no radiance field, but one of several colours these. What only members of its own group
 /// see of an occluder is in their own visibility, less the shadows of sharp lights.
 pub fn needs(scene: &Scene, mesh: usize, lights: Lights, groups: &Groups) -> Needed {
     let entities = || (0..scene.entities.len()).filter(|&i| scene.entities[i].mesh == mesh);
@@ -165,6 +168,7 @@ pub fn needs(scene: &Scene, mesh: usize, lights: Lights, groups: &Groups) -> Nee
     let radiance = coloured && shines(LightMethod::Harmonics);
     Needed {
         fields: [blocked.then_some(FieldKind::Occlusion), radiance.then_some(FieldKind::Radiance)],
+        lamp_colors: seen().any(|e| scene.entities[e].emits && method(e).has_colors(&scene.meshes[mesh])),
         silhouette: (casts && sharp && seen().any(|e| scene.entities[e].occludes)) || shines(LightMethod::Outline),
     }
 }
@@ -227,6 +231,8 @@ pub fn ensure(
             let find = |told: Progress<'_>| cache.silhouette(baker, mesh, options, told);
             to.silhouette = Some(making.once(|all| &mut all.silhouettes, mesh.content_hash(), what, find)?);
         }
+        to.lamp_colors =
+            needed.lamp_colors.then(|| Arc::new(LampColors::bake(&scene.meshes[index], options.silhouette.cells)));
         meshes.push(to);
     }
     let count = scene.entities.len();

@@ -22,6 +22,7 @@ pub mod capture;
 pub mod chunk;
 pub(crate) mod cluster_order;
 pub mod ensure;
+mod lamp_colors;
 pub mod levels;
 pub mod links;
 pub mod model;

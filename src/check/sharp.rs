@@ -16,7 +16,7 @@ use crate::scene::Lights;
 pub const PENUMBRA: f64 = 1e-4;
 
 /// Further entities beside [`MIXED`]: a light with an outline of its own, a small light, a ball that stands beyond it,
-/// a ring around it, a thin board in whose bounding sphere others stand, panels of every form, and a spot.
+/// a ring around it, a thin board in whose bounding sphere others stand, panels of every form, a spot, and a tube.
 const MORE: &str = r#"
 [[entity]]
 mesh = "ring"
@@ -53,7 +53,7 @@ disc = { radius_m = 0.3 }
 name = "window"
 rectangle = { size_m = [0.5, 0.8] }
 [[mesh]]
-name = "tube"
+name = "strip"
 rectangle = { size_m = [1.7, 0.1] }
 [[entity]]
 mesh = "lamp"
@@ -73,10 +73,18 @@ position = [1.913, 1.517, 0.591]
 rotation = { axis = [0.1, 0.2, 1], angle_deg = 97 }
 emission = [6, 7, 9]
 [[entity]]
-mesh = "tube"
+mesh = "strip"
 position = [0.313, 2.717, 0.691]
 rotation = { axis = [1, 0.2, 0.1], angle_deg = 171 }
 emission = [9, 9, 7]
+[[mesh]]
+name = "tube"
+cuboid = { size_m = [0.1, 1.1, 0.08], cells = 1 }
+[[entity]]
+mesh = "tube"
+position = [-0.613, 1.417, 1.391]
+rotation = { axis = [0.3, 0.1, 1], angle_deg = 71 }
+emission = [7, 9, 9]
 "#;
 
 /// A small frame with sharp lights.

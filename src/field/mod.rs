@@ -5,6 +5,7 @@ mod directions;
 pub mod extent;
 pub mod file;
 pub mod fit;
+pub mod lamp_colors;
 pub mod lattice;
 pub mod quantity;
 pub mod self_visibility;

@@ -40,14 +40,26 @@ pub enum LampFace {
     Rectangle(f64),
     /// A rectangle that shines from both sides.
     Sheet(f64),
+    /// A body that is long and about as wide as thick: the rectangle about its axis that faces whoever sees it.
+    Tube {
+        /// Which of the mesh's axes it lies along, 0 to 2.
+        axis: usize,
+        /// Its radius over its length, at most [`TUBE`].
+        radius: f64,
+    },
 }
 
+/// Radius over length up to which a body is a tube: its ends have an eighth of its surface.
+pub const TUBE: f64 = 0.125;
+
 impl LampFace {
-    /// Half the face's extent along x and along z, in bounding radii; of a disc the radius of a circle of equal area.
+    /// Half the face's extent along x and along z, of a tube along and across it, in bounding radii; of a disc the radius of a circle of equal area.
     pub fn half(self) -> DVec2 {
         match self {
             LampFace::Disc(share) => DVec2::splat(share.sqrt()),
             LampFace::Rectangle(ratio) | LampFace::Sheet(ratio) => DVec2::new(1.0, ratio) / ratio.hypot(1.0),
+            // Longer by a radius, it covers as much as the tube and its ends do on average over all directions.
+            LampFace::Tube { radius, .. } => DVec2::new(1.0 + radius, 2.0 * radius) / (2.0 * radius).hypot(1.0),
         }
     }
 }
@@ -173,8 +185,17 @@ impl SeenLight {
             true => (4.0 * half.x * half.y, Pattern::rectangle(half)),
             false => (PI * half.x * half.y, Pattern::DISC),
         };
-        let half = [rotation * (half.x * DVec3::X), rotation * (half.y * DVec3::Z)];
-        let front = rotation * DVec3::Y;
+        // Along both edges, and off the side that shines.
+        let axes = match panel {
+            LampFace::Tube { axis, .. } => {
+                let along = rotation * DVec3::AXES[axis];
+                let beside = along.cross(to).normalize_or(along.any_orthonormal_vector());
+                [along, beside, along.cross(beside)]
+            }
+            _ => [DVec3::X, DVec3::Z, DVec3::Y].map(|axis| rotation * axis),
+        };
+        let half = [half.x * axes[0], half.y * axes[1]];
+        let front = axes[2];
         let shows_back = matches!(panel, LampFace::Sheet(_)) && front.dot(to) > 0.0;
         let normal = if shows_back { -front } else { front };
         let is_exact =
@@ -363,6 +384,43 @@ mod tests {
             assert!((now[0] + now[1] - 1.0).abs() < 1e-12);
             assert!(i == 0 || (now[0] - before[0]).abs() < 2.1e-3, "at sine {}", f64::from(i) * 1e-4);
             before = now;
+        }
+    }
+
+    /// Against the sum over the patches of a cylinder and its two ends.
+    #[test]
+    fn a_tube_sends_what_its_surface_sends() {
+        for (radius, limit) in [(0.125, 0.06), (0.02, 0.02)] {
+            let tube = LampFace::Tube { axis: 2, radius };
+            for (to, normal) in [
+                (DVec3::new(0.3, 1.0, 0.1), DVec3::Y),
+                (DVec3::new(0.3, 3.0, 1.5), DVec3::Y),
+                (DVec3::new(0.0, 0.5, 0.4), DVec3::new(0.6, 0.8, 0.0)),
+            ] {
+                let light = SeenLight::panel(to, f64::hypot(0.5, radius), tube, DQuat::IDENTITY);
+                let mut sum = 0.0;
+                let mut add = |place: DVec3, outward: DVec3, area: f64| {
+                    let to = to + place;
+                    let facing = (-outward.dot(to)).max(0.0) * normal.dot(to).max(0.0);
+                    sum += facing * area / to.length_squared().powi(2);
+                };
+                for (i, j) in (0..400).flat_map(|i| (0..64).map(move |j| (i, j))) {
+                    let (sin, cos) = (std::f64::consts::TAU * f64::from(j) / 64.0).sin_cos();
+                    let outward = DVec3::new(cos, sin, 0.0);
+                    let along = (f64::from(i) + 0.5) / 400.0;
+                    add(
+                        radius * outward + (along - 0.5) * DVec3::Z,
+                        outward,
+                        std::f64::consts::TAU * radius / 25_600.0,
+                    );
+                    for end in [DVec3::Z, DVec3::NEG_Z] {
+                        let area = PI * radius * radius * 2.0 * along / 25_600.0;
+                        add(radius * along * outward + 0.5 * end, end, area);
+                    }
+                }
+                let error = light.irradiance(normal) / sum - 1.0;
+                assert!(error.abs() < limit, "{radius} at {to}: {error}");
+            }
         }
     }
 

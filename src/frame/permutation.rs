@@ -57,6 +57,7 @@ pub(super) fn sharp(
         silhouette: options.bake.silhouette,
         outlines: lights.contains(&&LightMethod::Outline),
         panels: lights.iter().any(|method| matches!(method, LightMethod::LampFace(_))),
+        colors: buffers.meshes.iter().any(|mesh| mesh.lamp_colors.is_some()),
         halves: any_field(SilhouetteField::has_halves),
         boxes: any_field(SilhouetteField::has_box),
         sheets: merge.sheets,

@@ -58,8 +58,8 @@ impl Frame {
         let device_mesh = &self.buffers.meshes[entity.mesh];
         // A field that nobody needs was not baked, and one of zeros changes nothing.
         let holds = |slot: &Option<FieldSlot>| slot.as_ref().is_some_and(|slot| slot.extent != Extent::Nothing);
-        let coloured = device_mesh.radiance.is_some() && entity.emits;
         let sharp = entity.emits && self.light_method(index).is_sharp();
+        let coloured = device_mesh.radiance.is_some() && entity.emits && !sharp;
         let source = if coloured { &device_mesh.radiance } else { &device_mesh.blocked };
         let rotation = placement.turn();
         let of_field = source.as_ref().filter(|_| !sharp).and_then(|slot| match slot.extent {
@@ -91,9 +91,16 @@ impl Frame {
         let [cos_a, sin_a, cos_b, sin_b, cos_c, sin_c] = turns(rotation).map(|x| x as f32);
         let centre = self.centre(index, placement).as_vec3();
         let radius_m = device_mesh.radius_m * f64::from(placement.scale);
-        let emission = match &device_mesh.radiance {
-            Some(slot) if entity.emits => entity.emission * slot.header.radiance_scale,
+        let method = self.light_method(index);
+        let is_sharp = entity.emits && method.is_sharp();
+        let emission = match (&device_mesh.radiance, &device_mesh.lamp_colors) {
+            (_, Some(slot)) if is_sharp => entity.emission * slot.colors.mean.as_vec3(),
+            (Some(slot), _) if entity.emits && !is_sharp => entity.emission * slot.header.radiance_scale,
             _ => entity.emission,
+        };
+        let radiance_base = match (&device_mesh.radiance, &device_mesh.lamp_colors) {
+            (_, colors) if is_sharp => colors.as_ref().map_or(NONE, |slot| slot.first_quad),
+            (field, _) => field.as_ref().map_or(0, FieldSlot::quad),
         };
         let slot = device_mesh.blocked.as_ref().or(device_mesh.radiance.as_ref());
         // Both fields of a mesh have the same shells.
@@ -107,14 +114,10 @@ impl Frame {
         let axes = sheet.map_or(area.axes.map(|axis| rotation * axis), |rectangle| rectangle.axes);
         let [area_x, area_y] = axes.map(|axis| axis.as_vec3());
         let terms = area.terms.map(|term| term as f32);
-        let method = self.light_method(index);
-        let light_share = match method {
-            LightMethod::Ball(share) | LightMethod::LampFace(LampFace::Disc(share)) => share,
-            _ => 0.0,
-        };
-        let light_ratio = match method {
-            LightMethod::LampFace(LampFace::Rectangle(ratio) | LampFace::Sheet(ratio)) => ratio,
-            _ => 0.0,
+        let [light_size, light_ratio] = match method {
+            LightMethod::Ball(share) | LightMethod::LampFace(LampFace::Disc(share)) => [share, 0.0],
+            LightMethod::LampFace(face) => [face.half().x, face.half().y / face.half().x],
+            LightMethod::Harmonics | LightMethod::Outline => [0.0; 2],
         };
         let shift = slot.map_or(Fit::ROUND.packed(), |slot| slot.header.lattice.packed());
         layout::DeviceEntity {
@@ -132,12 +135,12 @@ impl Frame {
             area_terms: [terms[2], terms[3], terms[4], terms[5]],
             silhouette: device_mesh.silhouette.as_ref().map_or(0, |slot| slot.first_quad),
             light_kind: method.kind() as u32,
-            light_share: light_share as f32,
+            light_size: light_size as f32,
             light_ratio: light_ratio as f32,
             light_ramp: entity.spot.map_or([0.0, 1.0], |spot| spot.ramp().map(|x| x as f32)),
             half_sides: sheet.map_or([0.0; 2], |rectangle| rectangle.half_m.map(|half| half as f32)),
             blocked_base: device_mesh.blocked.as_ref().map_or(0, FieldSlot::quad),
-            radiance_base: device_mesh.radiance.as_ref().map_or(0, FieldSlot::quad),
+            radiance_base,
         }
     }
 

@@ -218,10 +218,15 @@ impl FrameTwin<'_> {
         let light = |&entity: &usize| SharpLight {
             entity,
             emission: self.frame.scene.entities[entity].emission.as_dvec3(),
+            colors: self.frame.buffers.meshes[self.frame.scene.entities[entity].mesh]
+                .lamp_colors
+                .as_ref()
+                .map(|slot| &*slot.colors),
             method: self.frame.light_method(entity),
             spot: self.frame.scene.entities[entity].spot,
         };
-        let lights: Vec<SharpLight> = self.sharp_lights.iter().filter(|l| **l != receiver.index).map(light).collect();
+        let lights: Vec<SharpLight<'_>> =
+            self.sharp_lights.iter().filter(|l| **l != receiver.index).map(light).collect();
         let has_edge = |j: &usize| outlines[*j].silhouette.is_some() || outlines[*j].sheet.is_some();
         let occluders: Vec<usize> = receiver.occluders.iter().copied().filter(has_edge).collect();
         let self_maps = &self.frame.buffers.surface(receiver.index).self_maps;

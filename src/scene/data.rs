@@ -460,7 +460,7 @@ pub struct EntityData {
     /// 0.
     #[serde(default, deserialize_with = "values::radiance")]
     pub emission: Vec3,
-    /// Makes its light a spot along its own +y. It takes a mesh without colours of its own.
+    /// Makes its light a spot along its own +y.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub spot: Option<Spot>,
     /// Whether it lights others. By default it does if it has emission.

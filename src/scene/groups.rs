@@ -1,8 +1,8 @@
 //! Rigid groups: entities that never move against each other. A vertex's own visibility is past its whole group, so
 //! members never stand on each other's lists.
 
+use super::Scene;
 use super::light::{self, Lights};
-use super::{LightMethod, Scene};
 
 /// The group of every entity. An entity that moves is a group by itself.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -24,10 +24,7 @@ impl Groups {
     /// Lights in bands meet what lies before them in the chain of a vertex, so in a scene with such lights every entity
     /// is a group by itself.
     pub fn new(scene: &Scene, lights: Lights) -> Self {
-        let is_banded = |entity: usize| {
-            scene.entities[entity].emits && LightMethod::of(scene, entity, lights) == LightMethod::Harmonics
-        };
-        let banded = lights == Lights::Sh && light::has_emitters(scene) || (0..scene.entities.len()).any(is_banded);
+        let banded = lights == Lights::Sh && light::has_emitters(scene);
         let rests = |entity: &usize| scene.is_at_rest(*entity) && !banded;
         let first = (0..scene.entities.len()).find(rests).unwrap_or(0) as u32;
         let group = |entity: usize| if rests(&entity) { first } else { entity as u32 };
@@ -135,6 +132,7 @@ mod tests {
     #[test]
     fn a_light_in_bands_leaves_every_entity_alone() {
         let scene = scene("emission = [1, 1, 1]");
-        assert_eq!(Groups::new(&scene, Lights::Sharp), Groups::alone(&scene));
+        assert_eq!(Groups::new(&scene, Lights::Sh), Groups::alone(&scene));
+        assert_ne!(Groups::new(&scene, Lights::Sharp), Groups::alone(&scene));
     }
 }

@@ -1,6 +1,7 @@
 //! How a scene's lights are computed: by spherical harmonics, or as sharp lights whose shadows have edges.
 
 use super::{Entity, Scene};
+use crate::asset::Mesh;
 use crate::field::sub_light::LampFace;
 use crate::layout::LightKind;
 use glam::{DQuat, DVec3};
@@ -13,8 +14,7 @@ use serde::{Deserialize, Serialize};
 pub enum Lights {
     /// Spherical harmonics for all lights but spots; shadows have no edges.
     Sh,
-    /// Every entity that glows in one colour, or on one flat side, is a sharp light, as every sun is; all other light
-    /// stays in spherical harmonics.
+    /// Every entity that glows is a sharp light, as every sun is; the sky stays in spherical harmonics.
     #[default]
     Sharp,
 }
@@ -76,7 +76,7 @@ pub enum LightMethod {
     Ball(f64),
     /// As a sharp light of the mesh's own outline.
     Outline,
-    /// As a sharp light that is flat.
+    /// As a sharp light that is flat, or a tube.
     LampFace(LampFace),
 }
 
@@ -89,9 +89,13 @@ impl LightMethod {
             // Four bands would blur the rim of a spot's cone.
             _ if lights == Lights::Sh && spot.is_none() => LightMethod::Harmonics,
             Some(panel) => LightMethod::LampFace(panel),
-            None if mesh.colors.is_some() => LightMethod::Harmonics,
             None => mesh.ball_share().map_or(LightMethod::Outline, LightMethod::Ball),
         }
+    }
+
+    /// Whether parts of a sharp light of that mesh have colours of their own ([`crate::field::lamp_colors`]).
+    pub fn has_colors(self, mesh: &Mesh) -> bool {
+        matches!(self, LightMethod::Ball(_) | LightMethod::Outline) && mesh.colors.is_some()
     }
 
     /// Whether its shadows have edges.
@@ -108,6 +112,9 @@ impl LightMethod {
             LightMethod::LampFace(LampFace::Disc(_)) => LightKind::Disc,
             LightMethod::LampFace(LampFace::Rectangle(_)) => LightKind::Rectangle,
             LightMethod::LampFace(LampFace::Sheet(_)) => LightKind::Sheet,
+            LightMethod::LampFace(LampFace::Tube { axis, .. }) => {
+                [LightKind::TubeX, LightKind::TubeY, LightKind::TubeZ][axis]
+            }
         }
     }
 
@@ -120,6 +127,7 @@ impl LightMethod {
             LightMethod::LampFace(LampFace::Disc(_)) => "sharp, a disc",
             LightMethod::LampFace(LampFace::Rectangle(_)) => "sharp, a rectangle",
             LightMethod::LampFace(LampFace::Sheet(_)) => "sharp, a rectangle that shines from both sides",
+            LightMethod::LampFace(LampFace::Tube { .. }) => "sharp, a tube",
         }
     }
 }

@@ -399,8 +399,7 @@ impl Scene {
             return Err(Error::Input(format!("there is no entity {index}")));
         }
         data::check(format!("entity {index}"), &data)?;
-        check_entity(&data, &self.meshes[self.entities[index].mesh], &self.data)
-            .map_err(|what| Error::Input(format!("entity {index}: {what}")))?;
+        check_textures(&data, &self.data).map_err(|what| Error::Input(format!("entity {index}: {what}")))?;
         self.put_entity(index, data);
         Ok(())
     }
@@ -468,7 +467,7 @@ fn resolve_all(
     for (i, entity) in data.entities.iter().enumerate() {
         let mesh = data.meshes.iter().position(|mesh| mesh.name == entity.mesh);
         let mesh = mesh.ok_or_else(|| fail(i, format!("there is no mesh {:?}", entity.mesh)))?;
-        check_entity(entity, &meshes[mesh], data).map_err(|what| fail(i, what))?;
+        check_textures(entity, data).map_err(|what| fail(i, what))?;
         let paint = match &entity.albedo {
             Albedo::Color(_) => Paint::new(&entity.albedo, data, textures, &meshes[mesh]),
             Albedo::Texture(name) => *paints
@@ -481,12 +480,8 @@ fn resolve_all(
     Ok(entities)
 }
 
-/// Refuses a spot that would be computed by spherical harmonics, which have no cone, and the names of textures that there
-/// are not.
-fn check_entity(entity: &EntityData, mesh: &Mesh, data: &Data) -> std::result::Result<(), String> {
-    if entity.spot.is_some() && mesh.colors.is_some() && mesh.panel().is_none() {
-        return Err("a spot takes a mesh without colours of its own".into());
-    }
+/// Refuses the names of textures that there are not.
+fn check_textures(entity: &EntityData, data: &Data) -> std::result::Result<(), String> {
     let albedo = if let Albedo::Texture(name) = &entity.albedo { Some(name) } else { None };
     let is_missing = |name: &&String| data.textures.iter().all(|texture| texture.name != **name);
     let missing = albedo.into_iter().chain(entity.maps.names()).find(is_missing);

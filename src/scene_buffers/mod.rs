@@ -28,7 +28,7 @@ use crate::scene::{Lights, MapIndices, Scene};
 use field_atlas::FieldAtlas;
 pub use field_atlas::FieldSlot;
 use glam::DVec3;
-pub use silhouettes::{SilhouetteSlot, Silhouettes};
+pub use silhouettes::{ColorsSlot, SilhouetteSlot, Silhouettes};
 use std::ops::Range;
 use std::sync::Arc;
 use textures::Content;
@@ -41,6 +41,8 @@ pub struct DeviceMesh {
     pub radiance: Option<FieldSlot>,
     /// Silhouette field, if an entity needs one.
     pub silhouette: Option<SilhouetteSlot>,
+    /// Its colours, if it is a sharp light of several.
+    pub lamp_colors: Option<ColorsSlot>,
     /// The rectangle that blocks in place of fields, if the mesh is one.
     pub rectangle: Option<Rectangle>,
     /// Centre of the bounding sphere, metres.
@@ -167,12 +169,21 @@ impl SceneBuffers {
             field_atlas::field_atlas(device, scene, &baked.meshes, volume, options)?;
         let (silhouettes, outlines) = Silhouettes::new(device, &baked.meshes)?;
         let casters = (0..scene.meshes.len()).map(|mesh| scene.caster(mesh));
-        let meshes = casters.zip(slots).zip(outlines).map(|((caster, [blocked, radiance]), silhouette)| {
-            let (centre, radius_m) = caster.bounding_sphere();
-            let rectangle = caster.rectangle();
-            let radius_m = f64::from(radius_m);
-            DeviceMesh { blocked, radiance, silhouette, rectangle, centre_m: centre.as_dvec3(), radius_m }
-        });
+        let meshes =
+            casters.zip(slots).zip(outlines).map(|((caster, [blocked, radiance]), (silhouette, lamp_colors))| {
+                let (centre, radius_m) = caster.bounding_sphere();
+                let rectangle = caster.rectangle();
+                let radius_m = f64::from(radius_m);
+                DeviceMesh {
+                    blocked,
+                    radiance,
+                    silhouette,
+                    lamp_colors,
+                    rectangle,
+                    centre_m: centre.as_dvec3(),
+                    radius_m,
+                }
+            });
         let meshes = meshes.collect();
         // The vertices are reserved at once. Growing by halves would hold up to three times as much.
         let quads = 2 * baked.surfaces.iter().map(|surface| surface.mesh.positions.len()).sum::<usize>();
@@ -260,6 +271,7 @@ impl SceneBuffers {
             (device_mesh.blocked.is_some() || !blocked)
                 && (device_mesh.radiance.is_some() || !radiance)
                 && (device_mesh.silhouette.is_some() || !needed.silhouette)
+                && (device_mesh.lamp_colors.is_some() || !needed.lamp_colors)
         })
     }
 

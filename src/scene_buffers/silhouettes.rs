@@ -1,8 +1,9 @@
-//! All silhouette fields of a scene in two buffers, and where each begins.
+//! All silhouette fields of a scene in two buffers, and where each begins; and the colours of its lights of several.
 
 use super::ALIGNMENT;
 use crate::bake::BakedMesh;
 use crate::error::Result;
+use crate::field::lamp_colors::LampColors;
 use crate::field::silhouette::SilhouetteField;
 use crate::gpu::{Buffer, Device};
 use crate::layout::HAS_HALVES;
@@ -11,7 +12,8 @@ use std::sync::Arc;
 
 /// The silhouette fields of a scene. Where it has none, the buffers hold a little of nothing.
 pub struct Silhouettes {
-    /// Two quads a field and three a node, see `glsl/silhouette_field.glsl`.
+    /// Two quads a field and three a node, then three a node of each light of several colours, see
+    /// `glsl/silhouette_field.glsl`.
     pub nodes: Buffer,
     /// Two words a cell.
     pub cells: Buffer,
@@ -25,10 +27,21 @@ pub struct SilhouetteSlot {
     pub field: Arc<SilhouetteField>,
 }
 
+/// The colours of a mesh that is a sharp light of several.
+#[derive(Clone)]
+pub struct ColorsSlot {
+    /// Their first quad.
+    pub first_quad: u32,
+    pub colors: Arc<LampColors>,
+}
+
+/// Where the silhouette field and the colours of a mesh lie.
+pub type MeshSlots = (Option<SilhouetteSlot>, Option<ColorsSlot>);
+
 impl Silhouettes {
     /// Uploads the fields of a scene's meshes, and returns each mesh's place. Meshes that share a field share its
     /// place.
-    pub fn new(device: &Arc<Device>, baked: &[BakedMesh]) -> Result<(Self, Vec<Option<SilhouetteSlot>>)> {
+    pub fn new(device: &Arc<Device>, baked: &[BakedMesh]) -> Result<(Self, Vec<MeshSlots>)> {
         let mut nodes = Vec::<[f32; 4]>::new();
         let mut cells = Vec::<[u32; 2]>::new();
         let mut known = HashMap::<*const SilhouetteField, u32>::new();
@@ -42,7 +55,14 @@ impl Silhouettes {
             let halves = if field.has_halves() { HAS_HALVES } else { 0 };
             SilhouetteSlot { first_quad: first_quad | halves, field: field.clone() }
         };
-        let slots = baked.iter().map(|mesh| mesh.silhouette.as_ref().map(&mut slot)).collect();
+        let outlines: Vec<_> = baked.iter().map(|mesh| mesh.silhouette.as_ref().map(&mut slot)).collect();
+        let mut colors_slot = |colors: &Arc<LampColors>| {
+            let first_quad = nodes.len() as u32;
+            nodes.extend(colors.quads());
+            ColorsSlot { first_quad, colors: colors.clone() }
+        };
+        let colors = baked.iter().map(|mesh| mesh.lamp_colors.as_ref().map(&mut colors_slot));
+        let slots = outlines.into_iter().zip(colors).collect();
         nodes.resize(nodes.len().max(ALIGNMENT as usize / 16), [0.0; 4]);
         cells.resize(cells.len().max(ALIGNMENT as usize / 8), [0; 2]);
         let nodes = Buffer::with_data(device, "silhouette nodes", &nodes)?;

@@ -10,6 +10,7 @@ pub mod twin;
 
 use crate::bake::silhouette::SilhouetteOptions;
 use crate::error::Result;
+use crate::field::lamp_colors::{SHELL_STEP, SHELLS};
 use crate::field::lattice::CELL_WARP;
 use crate::field::sheet::{BEYOND as BEYOND_SHEET, CONTACT};
 use crate::field::silhouette::{DEEP, INSIDE, LEAST_PENUMBRA, LEAST_STEP, NEAREST, NO_BOX, REACH, TOUCHING};
@@ -53,6 +54,8 @@ pub struct SharpPermutation {
     pub outlines: bool,
     /// Whether the scene has a sharp light that shines from one flat side.
     pub panels: bool,
+    /// Whether the scene has a sharp light of several colours.
+    pub colors: bool,
     /// Whether any silhouette field has maps of halves.
     pub halves: bool,
     /// Whether any silhouette field has a box that tells more than its outlines: of a convex mesh that is no ball.
@@ -96,6 +99,7 @@ impl SharpPermutation {
             .define("ENTRY_BITS", ENTRY_BITS)
             .define("OUTLINES", self.outlines)
             .define("PANELS", self.panels)
+            .define("COLORS", self.colors)
             .define("HALVES", self.halves)
             .define("BOXES", self.boxes)
             .define("SHEETS", self.sheets)
@@ -111,6 +115,8 @@ impl SharpPermutation {
             ("REACH", REACH),
             ("NEAREST", NEAREST),
             ("NO_BOX", NO_BOX),
+            ("SHELL_STEP", SHELL_STEP),
+            ("LAST_SHELL", (SHELLS - 1) as f64),
             ("TOUCHING", TOUCHING),
             ("LEAST_STEP", LEAST_STEP),
             ("LEAST_PENUMBRA", LEAST_PENUMBRA),

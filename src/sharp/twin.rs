@@ -1,5 +1,6 @@
 //! The CPU twin of "sharp", in f64 and vertex by vertex, from the same stored numbers.
 
+use crate::field::lamp_colors::{LampColors, color_at};
 use crate::field::self_visibility::{self, BYTES};
 use crate::field::sheet::{BEYOND, Sheet, SheetEye, SheetShadow};
 use crate::field::silhouette::{Near, SilhouetteField};
@@ -25,10 +26,12 @@ pub struct SharpObject<'f> {
 }
 
 #[derive(Clone, Copy, Debug)]
-pub struct SharpLight {
+pub struct SharpLight<'f> {
     pub entity: usize,
     /// Linear RGB radiance.
     pub emission: DVec3,
+    /// Its colours, if it has several; they are factors on the emission.
+    pub colors: Option<&'f LampColors>,
     /// How its light is computed: as a sharp light's.
     pub method: LightMethod,
     /// Its cone, if it is a spot.
@@ -44,7 +47,7 @@ pub struct SharpTwin<'t> {
     pub occluders: &'t [usize],
     /// Self-visibility of its points, [`BYTES`] each, if it can shadow itself.
     pub self_maps: Option<&'t [u8]>,
-    pub lights: &'t [SharpLight],
+    pub lights: &'t [SharpLight<'t>],
     /// Whether a vertex leaves out an occluder before a light, or the light itself where both are the same.
     pub leaves: &'t (dyn Fn(usize, usize, usize) -> bool + Sync),
 }
@@ -65,16 +68,16 @@ impl SharpTwin<'_> {
     }
 
     fn vertex(&self, v: usize, point: &SurfacePoint) -> DVec3 {
-        let cone = |light: &SharpLight| {
+        let cone = |light: &SharpLight<'_>| {
             let shining = &self.objects[light.entity];
             light.spot.map_or(1.0, |spot| spot.share(shining.rotation, shining.centre - point.position))
         };
-        let lit = |light: &SharpLight| light.emission * cone(light) * self.irradiance(v, point, light) / PI;
+        let lit = |light: &SharpLight<'_>| light.emission * cone(light) * self.irradiance(v, point, light) / PI;
         self.lights.iter().filter(|light| !(self.leaves)(v, light.entity, light.entity)).map(lit).sum()
     }
 
-    /// Irradiance of a light of radiance 1.
-    fn irradiance(&self, v: usize, point: &SurfacePoint, light: &SharpLight) -> f64 {
+    /// Irradiance of a light of emission 1.
+    fn irradiance(&self, v: usize, point: &SurfacePoint, light: &SharpLight<'_>) -> DVec3 {
         let shining = &self.objects[light.entity];
         let to = shining.centre - point.position;
         let radius = shining.radius_m;
@@ -83,7 +86,7 @@ impl SharpTwin<'_> {
             LightMethod::Ball(share) => (SeenLight::new(to, radius), Some(share)),
             LightMethod::LampFace(panel) => (SeenLight::panel(to, radius, panel, shining.rotation), Some(1.0)),
             LightMethod::Outline => (SeenLight::outlined(to, radius), None),
-            LightMethod::Harmonics => return 0.0,
+            LightMethod::Harmonics => return DVec3::ZERO,
         };
         let between = |j: &&usize| **j != light.entity && !(self.leaves)(v, **j, light.entity);
         let between = self.occluders.iter().filter(between).map(|&j| &self.objects[j]);
@@ -103,7 +106,14 @@ impl SharpTwin<'_> {
             let toward = object.rotation.inverse() * part.toward;
             field.blocked(near, toward, distance_m / object.radius_m, part.tangent())
         };
-        let block = |(toward, parts): (DVec3, [LightPart; BLOCK])| -> f64 {
+        let colors =
+            light.colors.map(|colors| (colors.mean, colors.seen(shining.rotation.inverse() * seen.toward, seen.sine)));
+        let color = |part: &LightPart| {
+            let Some((mean, plane)) = &colors else { return DVec3::ONE };
+            let aside = (part.toward - part.toward.dot(seen.toward) * seen.toward) / seen.sine;
+            *mean * color_at(plane, shining.rotation.inverse() * aside)
+        };
+        let block = |(toward, parts): (DVec3, [LightPart; BLOCK])| -> DVec3 {
             let between: Vec<Near> = occluders.iter().map(|object| near(object, toward)).collect();
             let own = share.is_none().then(|| near(shining, toward));
             let part = |part: &LightPart| {
@@ -131,10 +141,10 @@ impl SharpTwin<'_> {
                         part.distance / receiver.radius_m,
                     )
                 });
-                part.share(point.normal) * sees * covers * through * past_sheets.free
+                part.share(point.normal) * sees * covers * through * past_sheets.free * color(part)
             };
             parts.iter().map(part).sum()
         };
-        seen.over_parts(point.normal) * seen.blocks().into_iter().map(block).sum::<f64>()
+        seen.over_parts(point.normal) * seen.blocks().into_iter().map(block).sum::<DVec3>()
     }
 }

@@ -119,7 +119,7 @@ fn entities_and_clusters_of_the_merge() {
                 area_terms,
                 silhouette,
                 light_kind,
-                light_share,
+                light_size,
                 light_ratio,
                 light_ramp,
                 half_sides,

@@ -1,0 +1,63 @@
+//! Colours of a light that has several, by direction and distance.
+//!
+//! Such a light is a sharp light of its mean colour, and each of its parts ([`super::sub_light`]) has a factor on that.
+//! The factor is a plane over the disc of the bounding sphere: a value at its middle and a slope, fitted to what shows
+//! there. There is a plane for every node of a [`NodeGrid`] and each of [`SHELLS`] distances.
+
+use super::silhouette_nodes::NodeGrid;
+use glam::{DVec3, DVec4};
+
+/// Distances: evenly spaced in bounding radii over distance, from 0 in steps of this.
+pub const SHELLS: usize = 3;
+pub const SHELL_STEP: f64 = 0.4;
+
+/// Of the three channels: slope along the axes of the object's frame, from the disc's middle to its rim, and value in
+/// the middle.
+pub type ColorPlane = [DVec4; 3];
+
+#[derive(Clone, Debug)]
+pub struct LampColors {
+    /// Mean over all directions and what is seen in them, of emission 1.
+    pub mean: DVec3,
+    nodes: NodeGrid,
+    /// For each shell and each map of the grid, as its direction sees it and as the opposite direction does.
+    planes: [Vec<[ColorPlane; 2]>; SHELLS],
+}
+
+impl LampColors {
+    pub fn new(mean: DVec3, nodes: NodeGrid, planes: [Vec<[ColorPlane; 2]>; SHELLS]) -> Self {
+        LampColors { mean, nodes, planes }
+    }
+
+    /// What `lamp_colors` in `glsl/silhouette_field.glsl` reads: three quads a node, shell by shell.
+    pub fn quads(&self) -> Vec<[f32; 4]> {
+        let mut quads = Vec::new();
+        for planes in &self.planes {
+            let node = |&(map, opposite): &(usize, bool)| planes[map][usize::from(opposite)];
+            quads.extend(self.nodes.nodes().iter().flat_map(node).map(|quad| quad.as_vec4().to_array()));
+        }
+        quads
+    }
+
+    /// The colours of a light whose centre lies in this direction, by the object's frame, and whose bounding sphere has
+    /// an angular radius of this sine.
+    pub fn seen(&self, toward: DVec3, sine: f64) -> ColorPlane {
+        let at = (sine / SHELL_STEP).min((SHELLS - 1) as f64);
+        let shell = (at as usize).min(SHELLS - 2);
+        let nearer = at - shell as f64;
+        let cell = self.nodes.cell(toward);
+        let mut plane = [DVec4::ZERO; 3];
+        for ((map, opposite), weight) in cell.nodes.into_iter().zip(self.nodes.weights(&cell, toward)) {
+            for (shell, share) in [(shell, 1.0 - nearer), (shell + 1, nearer)] {
+                let node = &self.planes[shell][map][usize::from(opposite)];
+                plane.iter_mut().zip(node).for_each(|(sum, quad)| *sum += weight * share * *quad);
+            }
+        }
+        plane
+    }
+}
+
+/// Factor on the mean colour at a place of the disc (object's frame; its rim is 1 from its middle).
+pub fn color_at(plane: &ColorPlane, place: DVec3) -> DVec3 {
+    DVec3::from_array(plane.map(|quad| quad.dot(place.extend(1.0)).max(0.0)))
+}

@@ -132,6 +132,21 @@ impl Texels {
         self.rgba.iter().any(|texel| texel[3] < u8::MAX)
     }
 
+    /// The mean colour of a triangle with corners of these coordinates.
+    pub fn mean_between(&self, corners: [Vec2; 3], wrap: [Wrap; 2]) -> Vec3 {
+        let cuts = self.cuts(corners);
+        let color = |[a, b, c]: [f32; 3]| self.at(a * corners[0] + b * corners[1] + c * corners[2], wrap).truncate();
+        middles(cuts).map(color).sum::<Vec3>() / (cuts * cuts) as f32
+    }
+
+    /// Into how many parts a side of a triangle with corners of these coordinates is cut for its mean: one for eight
+    /// texels, at most 8.
+    fn cuts(&self, corners: [Vec2; 3]) -> usize {
+        let size = Vec2::new(self.width as f32, self.height as f32);
+        let sides = [0, 1, 2].map(|k| ((corners[k] - corners[(k + 1) % 3]) * size).length());
+        (sides.into_iter().fold(0.0, f32::max) / 8.0).clamp(1.0, 8.0) as usize
+    }
+
     pub fn mean(&self) -> Vec3 {
         let sum: DVec3 = self.rgba.iter().map(|texel| linear(texel).truncate().as_dvec3()).sum();
         (sum / self.rgba.len() as f64).as_vec3()
@@ -245,12 +260,7 @@ impl Texture {
         for triangle in &mesh.triangles {
             let [a, b, c] = triangle.map(|v| mesh.positions[v as usize].as_dvec3());
             let area = (b - a).cross(c - a).length();
-            let cuts = coordinates.map_or(1, |(texels, uvs)| {
-                let corners = triangle.map(|v| uvs[v as usize]);
-                let size = Vec2::new(texels.width as f32, texels.height as f32);
-                let sides = [0, 1, 2].map(|k| ((corners[k] - corners[(k + 1) % 3]) * size).length());
-                (sides.into_iter().fold(0.0, f32::max) / 8.0).clamp(1.0, 8.0) as usize
-            });
+            let cuts = coordinates.map_or(1, |(texels, uvs)| texels.cuts(triangle.map(|v| uvs[v as usize])));
             let color: Vec3 = middles(cuts).map(|weights| at(*triangle, weights)).sum();
             sum += area * (color / (cuts * cuts) as f32).as_dvec3();
             whole += area;

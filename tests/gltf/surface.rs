@@ -220,6 +220,33 @@ fn emission_has_its_strength_and_pattern() {
     assert_eq!(import.notes.left_out(), [""; 0]);
 }
 
+/// A screen with a black frame, folded once, is as bright as its picture and not as its corners.
+#[test]
+fn what_is_not_flat_glows_as_its_picture_does_on_average() {
+    let mut model = Model::default();
+    let picture = image::GrayImage::from_fn(64, 64, |x, y| {
+        let is_frame = [x, y].iter().any(|at| !(8..56).contains(at));
+        image::Luma([if is_frame { 0 } else { 255 }])
+    });
+    let mut bytes = std::io::Cursor::new(Vec::new());
+    picture.write_to(&mut bytes, image::ImageFormat::Png).unwrap();
+    let view = model.view(bytes.get_ref());
+    let image = model.push("images", json!({ "bufferView": view, "mimeType": "image/png" }));
+    let texture = model.push("textures", json!({ "source": image }));
+    let glow = json!({ "emissiveFactor": [9, 9, 9], "emissiveTexture": { "index": texture } });
+    let material = model.push("materials", glow);
+    let positions = model.positions(&[-1., 0., 0., 0., 0., 0., 1., 0., -1., -1., 1., 0., 0., 1., 0., 1., 1., -1.]);
+    let uvs = model.floats(2, &[0., 1., 0.5, 1., 1., 1., 0., 0., 0.5, 0., 1., 0.]);
+    let indices = model.indices(&[0, 1, 4, 0, 4, 3, 1, 2, 5, 1, 5, 4]);
+    let mesh = model.mesh(json!({ "POSITION": positions, "TEXCOORD_0": uvs }), Some(indices), Some(material));
+    model.node(json!({ "mesh": mesh }));
+    let (scene, _) = model::scene(&model);
+    let mesh = &scene.meshes[0];
+    let colors = mesh.colors.as_ref().unwrap();
+    let mean = mesh.triangles.iter().flatten().map(|&v| colors[v as usize].x).sum::<f32>() / 12.0;
+    assert!((mean - 0.5625).abs() < 0.03, "{mean}: the frame leaves 0.75 x 0.75");
+}
+
 #[test]
 fn colours_of_vertices_tint_a_surface() {
     let mut model = Model::default();

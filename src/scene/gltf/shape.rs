@@ -5,7 +5,7 @@ use std::collections::HashMap;
 
 use ::gltf::json::mesh::{Mode, Primitive, Semantic};
 use ::gltf::json::validation::Checked;
-use glam::{DAffine3, DMat3, DVec3, Vec3};
+use glam::{DAffine3, DMat3, DVec3, Vec2, Vec3};
 
 use super::accessor;
 use super::document::Document;
@@ -143,6 +143,21 @@ impl Shape {
         }
         Mesh::with_attributes(name, positions, normals, attributes, triangles)
             .map_err(|error| document.fail(&self.place, error))
+    }
+
+    /// For each vertex the mean, over the triangles around it, of a value that a triangle has between corners with these
+    /// coordinates.
+    pub fn vertex_means(&self, uvs: &[Vec2], of_triangle: impl Fn([Vec2; 3]) -> Vec3) -> Vec<Vec3> {
+        let mut sums = vec![(Vec3::ZERO, 0.0); self.positions.len()];
+        for triangle in &self.triangles {
+            let area = area_m2(&self.positions, &[*triangle]) as f32;
+            let value = of_triangle(triangle.map(|v| uvs[v as usize]));
+            for &v in triangle {
+                sums[v as usize].0 += area * value;
+                sums[v as usize].1 += area;
+            }
+        }
+        sums.into_iter().map(|(sum, area)| if area > 0.0 { sum / area } else { Vec3::ZERO }).collect()
     }
 
     /// The number of the piece that each triangle belongs to: those that are cut off, and last the rest. All are 0 where

@@ -49,7 +49,7 @@ pub struct Applied {
 pub enum Glow {
     /// One colour.
     Even(Vec3),
-    /// A colour for each vertex.
+    /// A colour for each vertex: the mean of the triangles around it, which keeps the light of large ones.
     Varied(Vec<Vec3>),
 }
 
@@ -106,7 +106,8 @@ impl Textures {
             let texture = Texture { texels, wrap, factor: Vec3::ONE, alpha_cutoff: None, alpha_blend: false };
             return Ok(Glow::Even(texture.mean(&mesh)));
         }
-        Ok(Glow::Varied(uvs.iter().map(|uv| texels.at(*uv, applied.wrap).truncate()).collect()))
+        let mean = |corners| texels.mean_between(corners, applied.wrap);
+        Ok(Glow::Varied(shape.vertex_means(uvs, mean)))
     }
 
     fn sampled(&mut self, applied: &Applied) -> Arc<Texels> {

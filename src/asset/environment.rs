@@ -256,22 +256,23 @@ impl Environment {
         self.source.has_at_most_a_sun() || self.source.strength == 0.0
     }
 
-    /// Distant discs: the sun, that of the generated sky, and what was taken out of the picture ([`Equirect::peak`]).
+    /// Distant discs: the sun, that of the generated sky, and what was taken out of the picture ([`Equirect::lights`]).
     /// Scenes light by them as by entities, so that they cast sharp shadows.
     pub fn discs(&self) -> Vec<Disc> {
         let EnvironmentData { sun, image, strength, .. } = &self.source;
-        let peak = self.picture.as_ref().zip(image.as_ref()).and_then(|(picture, image)| {
-            let scaled = |disc: Disc| Disc { radiance: disc.radiance * f64::from(image.scale), ..disc };
-            picture.peak().map(scaled)
-        });
-        let all = [sun.as_ref().map(Sun::disc), self.dome.as_ref().map(|dome| dome.disc()), peak];
+        let mut all: Vec<Disc> =
+            sun.as_ref().map(Sun::disc).into_iter().chain(self.dome.as_ref().map(|dome| dome.disc())).collect();
+        if let (Some(picture), Some(image)) = (&self.picture, image) {
+            let scaled = |disc: &Disc| Disc { radiance: disc.radiance * f64::from(image.scale), ..*disc };
+            all.extend(picture.lights().iter().map(scaled));
+        }
         let turn = self.turn();
         let placed = |disc: Disc| Disc {
             toward: (turn * disc.toward).normalize(),
             radiance: disc.radiance * f64::from(*strength),
             ..disc
         };
-        all.into_iter().flatten().filter(|disc| disc.radiance != DVec3::ZERO).map(placed).collect()
+        all.into_iter().filter(|disc| disc.radiance != DVec3::ZERO).map(placed).collect()
     }
 
     fn turn(&self) -> DQuat {

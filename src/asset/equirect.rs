@@ -8,7 +8,7 @@ use image::{ImageFormat, ImageReader, Limits};
 use rayon::prelude::*;
 
 use super::disc::Disc;
-use super::peak;
+use super::peak::Sky;
 use super::picture::linear_from_srgb;
 use crate::error::{Error, Result};
 use crate::sh::basis::{self, MAX_BANDS, MAX_COEFFICIENTS};
@@ -34,7 +34,7 @@ pub struct Equirect {
     width: usize,
     height: usize,
     texels: Vec<[f32; 3]>,
-    peak: Option<Disc>,
+    lights: Vec<Disc>,
     coefficients: [Vec<f64>; 3],
 }
 
@@ -81,21 +81,22 @@ impl Equirect {
             width: rgb.width() as usize,
             height: rgb.height() as usize,
             texels,
-            peak: None,
+            lights: Vec::new(),
             coefficients: Default::default(),
         };
-        picture.peak = picture.take_out_peak();
+        picture.lights = picture.take_out_lights();
         picture.coefficients = picture.project();
         Ok(picture)
     }
 
-    /// The sun of the picture, which its texels and coefficients no longer hold, if it had one: a spot of at most 8
-    /// degrees that sends at least a twentieth of all light.
-    pub fn peak(&self) -> Option<Disc> {
-        self.peak
+    /// The sun and the bright windows of the picture, which its texels and coefficients no longer hold: a spot of at
+    /// most 8 degrees that sends at least a twentieth of all light, and up to three compact patches of up to 60 degrees
+    /// that stand out.
+    pub fn lights(&self) -> &[Disc] {
+        &self.lights
     }
 
-    fn take_out_peak(&mut self) -> Option<Disc> {
+    fn take_out_lights(&mut self) -> Vec<Disc> {
         let width = self.width as f64;
         let height = self.height as f64;
         let direction = |x: usize, y: usize| {
@@ -103,7 +104,7 @@ impl Equirect {
             let (level, up) = (PI * (y as f64 + 0.5) / height).sin_cos();
             DVec3::new(level * across, up, -level * ahead)
         };
-        peak::take_out(&mut self.texels, [self.width, self.height], &direction)
+        Sky::new(&mut self.texels, [self.width, self.height], &direction).take_out_lights()
     }
 
     /// The texel in `direction` (unit).

@@ -1,8 +1,8 @@
-//! The sun of an environment picture, taken out as a disc.
+//! The sun and the bright windows of an environment picture, taken out as discs.
 //!
 //! Four bands spread a sun of half a degree over half the sky. What stands out of its surroundings in a small spot
-//! becomes a [`Disc`] instead, which casts sharp shadows, and the picture keeps the rest. Together they send as much
-//! light as the whole picture.
+//! becomes a [`Disc`] instead, which casts sharp shadows, and so does a window that is not too long for a disc. The
+//! picture keeps the rest. Together they send as much light as the whole picture.
 
 use super::disc::Disc;
 use glam::DVec3;
@@ -21,78 +21,169 @@ const LEAST_TEXELS: f64 = 2.0;
 /// Least half diameter of the disc, radians: the sun's.
 const LEAST_HALF_RAD: f64 = 0.265 * PI / 180.0;
 
-/// Takes the peak out of a picture of `width` x `height` texels, rows from +y, if it has one. `direction` gives the
-/// middle of a texel by column and row.
-pub(super) fn take_out(
-    texels: &mut [[f32; 3]],
-    [width, height]: [usize; 2],
-    direction: &dyn Fn(usize, usize) -> DVec3,
-) -> Option<Disc> {
-    let row_rad = PI / height as f64;
-    if row_rad * LEAST_TEXELS > REACH_RAD {
-        return None;
+/// Radiance of a window at least: of the picture's median, and of its brightest texel.
+const WINDOW: [f64; 2] = [4.0, 0.1];
+/// Solid angles of windows, steradians: of discs with diameters of 4 and of 60 degrees.
+const WINDOW_SR: [f64; 2] = [0.0038, 0.84];
+/// Share of all light that a window sends at least.
+const LEAST_WINDOW: f64 = 0.08;
+/// Solid angle of a window over that of the disc with its second moments, at least. A rectangle has as much up to
+/// edges of 3 to 1.
+const LEAST_FILLED: f64 = 0.55;
+/// Windows that are taken out at most: each is a light.
+const MOST_WINDOWS: usize = 3;
+
+/// Texels of a picture, rows from +y, and where they lie.
+pub(super) struct Sky<'t> {
+    texels: &'t mut [[f32; 3]],
+    width: usize,
+    height: usize,
+    /// Of a texel of each row, steradians.
+    solid_angles: Vec<f64>,
+    /// Unit direction of the middle of a texel, by column and row.
+    direction: &'t dyn Fn(usize, usize) -> DVec3,
+}
+
+impl<'t> Sky<'t> {
+    pub fn new(
+        texels: &'t mut [[f32; 3]],
+        [width, height]: [usize; 2],
+        direction: &'t dyn Fn(usize, usize) -> DVec3,
+    ) -> Self {
+        let solid_angle = |y: usize| {
+            let [north, south] = [y, y + 1].map(|y| (y as f64 * PI / height as f64).cos());
+            (north - south) * TAU / width as f64
+        };
+        Sky { texels, width, height, solid_angles: (0..height).map(solid_angle).collect(), direction }
     }
-    let solid_angle = |y: usize| {
-        let [north, south] = [y, y + 1].map(|y| (y as f64 * row_rad).cos());
-        (north - south) * TAU / width as f64
-    };
-    let rgb = |texel: &[f32; 3]| DVec3::from_array(texel.map(f64::from));
-    let gray = |texel: &[f32; 3]| rgb(texel).element_sum();
-    let whole: f64 =
-        texels.chunks_exact(width).enumerate().map(|(y, row)| row.iter().map(gray).sum::<f64>() * solid_angle(y)).sum();
-    // The first of the brightest.
-    let brightest =
-        (0..texels.len()).reduce(|best, i| if gray(&texels[i]) > gray(&texels[best]) { i } else { best })?;
-    let x = brightest % width;
-    let y = brightest / width;
-    let middle = direction(x, y);
-    let rows = (AROUND_RAD / row_rad).ceil() as usize + 1;
-    let near: Vec<(usize, f64, DVec3)> = (y.saturating_sub(rows)..(y + rows + 1).min(height))
-        .flat_map(|y| (0..width).map(move |x| (x, y)))
-        .map(|(x, y)| (y * width + x, solid_angle(y), direction(x, y)))
-        .filter(|(_, _, toward)| toward.angle_between(middle) < AROUND_RAD)
-        .collect();
-    let (inner, outer): (Vec<_>, Vec<_>) = near.into_iter().partition(|(_, _, d)| d.angle_between(middle) < REACH_RAD);
-    if outer.is_empty() {
-        return None;
+
+    fn solid_angle(&self, index: usize) -> f64 {
+        self.solid_angles[index / self.width]
     }
-    // Radiance of the surroundings: the median of each channel.
-    let median = |channel: usize| {
-        let mut values: Vec<f32> = outer.iter().map(|(i, _, _)| texels[*i][channel]).collect();
-        values.sort_by(f32::total_cmp);
-        values[values.len() / 2]
-    };
-    let around = [0, 1, 2].map(median);
-    let excess = |texel: &[f32; 3]| [0, 1, 2].map(|c| (texel[c] - around[c]).max(0.0));
-    let mut taken = DVec3::ZERO;
-    let mut within = 0.0;
-    let mut toward = DVec3::ZERO;
-    for (i, solid, at) in &inner {
-        let over = rgb(&excess(&texels[*i])) * *solid;
-        taken += over;
-        within += gray(&texels[*i]) * solid;
-        toward += *at * over.element_sum();
+
+    fn toward(&self, index: usize) -> DVec3 {
+        (self.direction)(index % self.width, index / self.width)
     }
-    let amount = taken.element_sum();
-    if !(amount > LEAST_SHARE * whole && amount > LEAST_EXCESS * within) {
-        return None;
+
+    fn whole(&self) -> f64 {
+        (0..self.texels.len()).map(|i| gray(&self.texels[i]) * self.solid_angle(i)).sum()
     }
-    let toward = toward.normalize();
-    // A disc has half the square of its radius as the mean square of the distance from its middle.
-    let spread: f64 = inner
-        .iter()
-        .map(|(i, solid, at)| rgb(&excess(&texels[*i])).element_sum() * solid * at.angle_between(toward).powi(2))
-        .sum::<f64>()
-        / amount;
-    let half_angle_rad = (2.0 * spread).sqrt().clamp(LEAST_HALF_RAD, REACH_RAD);
-    for (i, _, _) in &inner {
-        let over = excess(&texels[*i]);
-        texels[*i].iter_mut().zip(over).for_each(|(texel, over)| *texel -= over);
+
+    /// The medians of the channels of some texels.
+    fn median(&self, of: impl Iterator<Item = usize> + Clone) -> [f32; 3] {
+        [0, 1, 2].map(|channel| {
+            let mut values: Vec<f32> = of.clone().map(|i| self.texels[i][channel]).collect();
+            let middle = values.len() / 2;
+            *values.select_nth_unstable_by(middle, f32::total_cmp).1
+        })
     }
-    Some(Disc {
-        name: "sun of the picture",
-        toward,
-        half_angle_rad,
-        radiance: taken / Disc::solid_angle(half_angle_rad),
-    })
+
+    /// Takes from some texels what is over `around`, as a disc of at most half the diameter `most_rad`, where `counts`
+    /// says so of its light and of its solid angle over that of the texels.
+    fn take_out(
+        &mut self,
+        name: &'static str,
+        texels: &[usize],
+        around: [f32; 3],
+        half_rad: [f64; 2],
+        counts: impl FnOnce(f64, f64) -> bool,
+    ) -> Option<Disc> {
+        let excess = |texel: &[f32; 3]| [0, 1, 2].map(|c| (texel[c] - around[c]).max(0.0));
+        let over = |i: usize| DVec3::from_array(excess(&self.texels[i]).map(f64::from)) * self.solid_angle(i);
+        let taken: DVec3 = texels.iter().map(|&i| over(i)).sum();
+        let amount = taken.element_sum();
+        let toward = texels.iter().map(|&i| over(i).element_sum() * self.toward(i)).sum::<DVec3>().try_normalize()?;
+        // A disc has half the square of its radius as the mean square of the distance from its middle.
+        let square = |&i: &usize| over(i).element_sum() * self.toward(i).angle_between(toward).powi(2);
+        let spread = texels.iter().map(square).sum::<f64>() / amount;
+        let half_angle_rad = (2.0 * spread).sqrt().clamp(half_rad[0], half_rad[1]);
+        let solid_angle = Disc::solid_angle(half_angle_rad);
+        if !counts(amount, texels.iter().map(|&i| self.solid_angle(i)).sum::<f64>() / solid_angle) {
+            return None;
+        }
+        for &i in texels {
+            let over = excess(&self.texels[i]);
+            self.texels[i].iter_mut().zip(over).for_each(|(texel, over)| *texel -= over);
+        }
+        Some(Disc { name, toward, half_angle_rad, radiance: taken / solid_angle })
+    }
+
+    /// Takes the sun and bright windows out.
+    pub fn take_out_lights(mut self) -> Vec<Disc> {
+        let sun = self.take_out_sun();
+        sun.into_iter().chain(self.take_out_windows()).collect()
+    }
+
+    fn take_out_windows(&mut self) -> Vec<Disc> {
+        let whole = self.whole();
+        let around = self.median((0..self.texels.len()).step_by((self.texels.len() >> 16).max(1)));
+        let brightest = self.texels.iter().map(gray).fold(0.0, f64::max);
+        let least = (WINDOW[0] * gray(&around)).max(WINDOW[1] * brightest);
+        let mut windows: Vec<(f64, Vec<usize>)> = Vec::new();
+        let mut is_known: Vec<bool> = self.texels.iter().map(|texel| gray(texel) <= least).collect();
+        for first in 0..self.texels.len() {
+            if std::mem::replace(&mut is_known[first], true) {
+                continue;
+            }
+            // All bright texels that are connected with it.
+            let mut window = vec![first];
+            let mut at = 0;
+            while at < window.len() {
+                let x = window[at] % self.width;
+                let y = window[at] / self.width;
+                let row = y * self.width;
+                let sides = [row + (x + 1) % self.width, row + (x + self.width - 1) % self.width];
+                let above = (y > 0).then(|| window[at] - self.width);
+                let below = (y + 1 < self.height).then(|| window[at] + self.width);
+                for next in sides.into_iter().chain(above).chain(below) {
+                    if !std::mem::replace(&mut is_known[next], true) {
+                        window.push(next);
+                    }
+                }
+                at += 1;
+            }
+            let solid_angle: f64 = window.iter().map(|&i| self.solid_angle(i)).sum();
+            if (WINDOW_SR[0]..WINDOW_SR[1]).contains(&solid_angle) {
+                windows.push((window.iter().map(|&i| gray(&self.texels[i]) * self.solid_angle(i)).sum(), window));
+            }
+        }
+        windows.sort_by(|(a, _), (b, _)| b.total_cmp(a));
+        let mut take_out = |window: &[usize]| {
+            self.take_out("window of the picture", window, around, [LEAST_HALF_RAD, PI / 4.0], |amount, filled| {
+                amount > LEAST_WINDOW * whole && filled > LEAST_FILLED
+            })
+        };
+        windows.iter().filter_map(|(_, window)| take_out(window)).take(MOST_WINDOWS).collect()
+    }
+
+    /// Takes out what stands out in a small spot, if anything does.
+    fn take_out_sun(&mut self) -> Option<Disc> {
+        let row_rad = PI / self.height as f64;
+        if row_rad * LEAST_TEXELS > REACH_RAD {
+            return None;
+        }
+        let whole = self.whole();
+        // The first of the brightest.
+        let brightest = (0..self.texels.len())
+            .reduce(|best, i| if gray(&self.texels[i]) > gray(&self.texels[best]) { i } else { best })?;
+        let middle = self.toward(brightest);
+        let rows = (AROUND_RAD / row_rad).ceil() as usize + 1;
+        let y = brightest / self.width;
+        let near = y.saturating_sub(rows) * self.width..(y + rows + 1).min(self.height) * self.width;
+        let near = near.map(|i| (i, self.toward(i).angle_between(middle))).filter(|(_, angle)| *angle < AROUND_RAD);
+        let (inner, outer): (Vec<_>, Vec<_>) = near.partition(|(_, angle)| *angle < REACH_RAD);
+        if outer.is_empty() {
+            return None;
+        }
+        let around = self.median(outer.iter().map(|(i, _)| *i));
+        let inner: Vec<usize> = inner.into_iter().map(|(i, _)| i).collect();
+        let within: f64 = inner.iter().map(|&i| gray(&self.texels[i]) * self.solid_angle(i)).sum();
+        self.take_out("sun of the picture", &inner, around, [LEAST_HALF_RAD, REACH_RAD], |amount, _| {
+            amount > LEAST_SHARE * whole && amount > LEAST_EXCESS * within
+        })
+    }
+}
+
+fn gray(texel: &[f32; 3]) -> f64 {
+    DVec3::from_array(texel.map(f64::from)).element_sum()
 }

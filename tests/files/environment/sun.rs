@@ -2,7 +2,7 @@
 
 use super::{agree, build, by_rule};
 use glam::{DVec3, Vec3};
-use shadow_fields::asset::disc::Sun;
+use shadow_fields::asset::disc::{Disc, Sun};
 use shadow_fields::asset::environment::{Environment, EnvironmentData, EnvironmentImage};
 use shadow_fields::asset::picture::write_exr;
 use shadow_fields::asset::sky::Sky;
@@ -105,7 +105,7 @@ fn a_sun_is_a_disc_of_its_own() {
 
 /// What is taken out of a picture as a disc and what is left send as much light as the picture did, of every colour.
 #[test]
-fn the_sun_of_a_picture_is_taken_out_whole() {
+fn the_lights_of_a_picture_are_taken_out_whole() {
     const SIZE: [u32; 2] = [512, 256];
     let folder = tempfile::tempdir().unwrap();
     let open = |name: &str, radiance: &dyn Fn(DVec3) -> [f32; 3]| {
@@ -139,17 +139,32 @@ fn the_sun_of_a_picture_is_taken_out_whole() {
     let [disc] = sunny.discs()[..] else { panic!("one sun") };
     assert!(disc.toward.angle_between(sun) < 0.1_f64.to_radians(), "{}", disc.toward);
     assert!((disc.half_angle_rad.to_degrees() - 1.5).abs() < 0.15, "{}", disc.half_angle_rad.to_degrees());
-    let solid_angle = 4.0 * PI * (disc.half_angle_rad / 2.0).sin().powi(2);
-    for (channel, (rest, whole)) in sunny.coefficients(1).iter().zip(whole).enumerate() {
-        let sum = rest[0] * (4.0 * PI).sqrt() + disc.radiance[channel] * solid_angle;
+    let sends = |environment: &Environment, channel: usize| {
+        let discs = environment.discs();
+        let of_disc = |disc: &Disc| disc.radiance[channel] * Disc::solid_angle(disc.half_angle_rad);
+        environment.coefficients(1)[channel][0] * (4.0 * PI).sqrt() + discs.iter().map(of_disc).sum::<f64>()
+    };
+    for (channel, whole) in whole.into_iter().enumerate() {
+        let sum = sends(&sunny, channel);
         assert!((sum / whole - 1.0).abs() < 1e-5, "{sum} for {whole}");
     }
     assert!(sunny.radiance(sun)[0] < 1.0, "what is left is as bright as what is around: {:?}", sunny.radiance(sun));
-    // Nothing is taken from pictures without a small bright spot.
+    // A round window beside one of 40 by 40 degrees across the picture's edge, and a strip of sky too long for a disc.
+    let pane = |d: DVec3| d.z > 0.0 && (d.x / d.z).abs().max((d.y / d.z).abs()) < 20_f64.to_radians().tan();
+    let strip = |d: DVec3| d.y.abs() < 0.02 && d.z < 0.0;
+    let (room, whole) =
+        open("room.exr", &|d| [0.1 + spot(d, 20.0, 9.0) + if pane(d) || strip(d) { 6.0 } else { 0.0 }; 3]);
+    let [round, square] = room.discs()[..] else { panic!("{} windows", room.discs().len()) };
+    assert!(round.toward.angle_between(sun) < 0.01 && (round.half_angle_rad.to_degrees() - 20.0).abs() < 0.5);
+    let degrees = square.half_angle_rad.to_degrees();
+    assert!(square.toward.angle_between(DVec3::Z) < 0.01 && (degrees - 22.5).abs() < 1.0, "{degrees}");
+    let sum = sends(&room, 0);
+    assert!((sum / whole[0] - 1.0).abs() < 1e-5, "{sum} for {}", whole[0]);
+    // Nothing is taken from pictures without a bright spot.
     for (name, radiance) in [
         ("even.exr", &(|_| [1.0_f32; 3]) as &dyn Fn(DVec3) -> [f32; 3]),
         ("sky.exr", &|d| [sky(d); 3]),
-        ("window.exr", &|d| [sky(d) + spot(d, 20.0, 30.0); 3]),
+        ("half.exr", &|d| [if d.x > 0.0 { 9.0 } else { 0.1 }; 3]),
         ("star.exr", &|d| [sky(d) + spot(d, 0.6, 5.0); 3]),
         ("dark.exr", &|_| [0.0; 3]),
     ] {

@@ -125,7 +125,12 @@ impl Frame {
                 light_count: glossy.lights.iter().filter(|&&light| light != NONE).count().max(1) as u32,
                 textured: u32::from(entity.maps.any()),
                 glow: entity.maps.glow_scale.extend(0.0).to_array(),
-                factors: [factor.roughness, factor.metallic, 1.0, f32::from(u8::from(entity.maps.glow.is_some()))],
+                factors: [
+                    factor.roughness,
+                    factor.metallic,
+                    entity.maps.normal_scale,
+                    f32::from(u8::from(entity.maps.glow.is_some())),
+                ],
             };
         }
         self.reflections.as_mut().map_or(Ok(()), |reflections| reflections.entities.write(&entities))

@@ -41,6 +41,9 @@ pub struct Maps {
     /// The normal in tangent space, as in glTF: red along u, green against v, blue away from the surface.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub normal: Option<String>,
+    /// Factor on the slope of those normals; 1 unless it is given.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub normal_scale: Option<f32>,
     /// A factor on the emission that is seen. What the surface shines on others goes by its mesh's colours.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub glow: Option<String>,
@@ -60,6 +63,8 @@ pub struct MapIndices {
     pub gloss: Option<usize>,
     /// Normals.
     pub normal: Option<usize>,
+    /// Factor on their slope; 0 without normals.
+    pub normal_scale: f32,
     /// The emission that is seen.
     pub glow: Option<usize>,
     /// What its texels are multiplied by: 1 over their mean on the mesh, which the emission stands for; 1 where the mesh

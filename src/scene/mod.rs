@@ -367,7 +367,8 @@ impl Scene {
         let up = turn * (across * first.x - along * second.x);
         let flat = |axis: Vec3| (axis - normal * normal.dot(axis)).normalize_or_zero();
         let found = 2.0 * found - 1.0;
-        let tilted = found.x * flat(right) + found.y * up.normalize_or_zero() + found.z.max(0.0) * normal;
+        let slope = maps.normal_scale * (found.x * flat(right) + found.y * up.normalize_or_zero());
+        let tilted = slope + found.z.max(0.0) * normal;
         (Some(gloss), tilted.normalize_or(normal))
     }
 
@@ -518,13 +519,15 @@ fn coat(entity: &EntityData, data: &Data, textures: &[Arc<Texture>], mesh: &Mesh
         let name = name.as_ref().filter(|_| mesh.uvs.is_some())?;
         data.textures.iter().position(|texture| texture.name == *name && texture.file.is_some())
     };
-    let Maps { gloss: varies, normal, glow } = &entity.maps;
+    let Maps { gloss: varies, normal, normal_scale, glow } = &entity.maps;
     let glow = number(glow);
     let glow_scale = glow.map_or(Vec3::ZERO, |index| {
         let mean = || Texture { factor: Vec3::ONE, ..(*textures[index]).clone() }.mean(mesh).max(Vec3::splat(1e-6));
         if mesh.colors.is_some() { Vec3::ONE } else { mean().recip() }
     });
-    let maps = MapIndices { gloss: number(varies), normal: number(normal), glow, glow_scale };
+    let normal = number(normal);
+    let normal_scale = normal.map_or(0.0, |_| normal_scale.unwrap_or(1.0));
+    let maps = MapIndices { gloss: number(varies), normal, normal_scale, glow, glow_scale };
     if let Some(texels) = maps.gloss.and_then(|index| textures[index].texels.as_ref()) {
         let [_, roughness, metallic] = texels.mean_bytes();
         gloss.roughness *= roughness;

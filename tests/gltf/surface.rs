@@ -164,7 +164,7 @@ fn textures_become_maps() {
     let info = json!({ "index": texture });
     let material = json!({
         "pbrMetallicRoughness": { "metallicRoughnessTexture": info, "roughnessFactor": 0.5 },
-        "normalTexture": info, "emissiveTexture": info, "emissiveFactor": [1, 1, 1],
+        "normalTexture": { "index": texture, "scale": 0.5 }, "emissiveTexture": info, "emissiveFactor": [1, 1, 1],
     });
     square(&mut model, material.clone(), true);
     let mut moved = material;
@@ -176,8 +176,14 @@ fn textures_become_maps() {
         json!({ "pbrMetallicRoughness": { "metallicRoughnessTexture": info, "metallicFactor": 1 } }),
         false,
     );
+    let shift = json!({ "KHR_texture_transform": { "offset": [0, -0.5] } });
+    let shifted = json!({ "index": texture, "extensions": shift });
+    let material = json!({ "pbrMetallicRoughness": { "metallicRoughnessTexture": shifted }, "normalTexture": shifted });
+    square(&mut model, material, true);
     let import = load(&model);
-    let [all, other, plain] = [0, 1, 2].map(|index| &import.data.entities[index]);
+    let [all, other, plain, shifted] = [0, 1, 2, 3].map(|index| &import.data.entities[index]);
+    assert_eq!((all.maps.normal_scale, shifted.maps.normal_scale), (Some(0.5), None));
+    assert!(shifted.maps.gloss.is_some() && shifted.maps.gloss == shifted.maps.normal);
     assert!(all.maps.gloss.is_some() && all.maps.gloss == all.maps.normal && all.maps.gloss == all.maps.glow);
     assert_eq!((all.gloss.unwrap().roughness, all.emits), (0.5, Some(false)));
     assert!(other.maps.normal.is_none() && other.maps.gloss == all.maps.gloss);
@@ -274,8 +280,13 @@ fn blended_and_transmissive_surfaces_let_light_through() {
     square(&mut model, json!({ "alphaMode": "OPAQUE", "pbrMetallicRoughness": color(0.25) }), false);
     let glass = json!({ "KHR_materials_transmission": { "transmissionFactor": 0.8 } });
     square(&mut model, json!({ "pbrMetallicRoughness": color(1.0), "extensions": glass }), false);
+    // Half of it is red.
+    let texture = texture(&mut model);
+    let half = json!({ "transmissionFactor": 0.8, "transmissionTexture": { "index": texture } });
+    let glass = json!({ "KHR_materials_transmission": half });
+    square(&mut model, json!({ "pbrMetallicRoughness": color(1.0), "extensions": glass }), false);
     let (scene, _) = model::scene(&model);
-    for (entity, opacity, albedo) in [(0, 0.25, 0.125), (1, 1.0, 0.5), (2, 0.6, 0.1)] {
+    for (entity, opacity, albedo) in [(0, 0.25, 0.125), (1, 1.0, 0.5), (2, 0.6, 0.1), (3, 0.8, 0.3)] {
         let found = &scene.entities[entity];
         assert!((found.opacity - opacity).abs() < 1e-6 && (found.albedo.x - albedo).abs() < 1e-6, "{found:?}");
         assert_eq!(found.transparent, opacity < 1.0);

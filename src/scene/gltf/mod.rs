@@ -547,14 +547,19 @@ impl Builder {
 
     /// An entity of a mesh that looks as a primitive does.
     fn looks(&mut self, primitive: &Primitive, mesh: &str) -> EntityData {
-        let Surface { emission, gloss, maps, opacity, .. } = primitive.surface;
+        let Surface { emission, gloss, maps, normal_scale, opacity, .. } = primitive.surface;
         let albedo = self.albedo(primitive);
         let [gloss_map, normal_map, glow_map] = maps.map(|map| map.map(|map| self.map(map)));
         let has_pattern = primitive.surface.attributes.colors.is_some() || maps[2].is_some();
         EntityData {
             albedo,
             gloss,
-            maps: Maps { gloss: gloss_map, normal: normal_map, glow: glow_map },
+            maps: Maps {
+                gloss: gloss_map,
+                normal_scale: normal_map.as_ref().and(normal_scale),
+                normal: normal_map,
+                glow: glow_map,
+            },
             opacity,
             emission,
             // What glows in places casts a shadow, and lights others where it is brighter than white on a screen.

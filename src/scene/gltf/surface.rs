@@ -1,6 +1,7 @@
 //! Materials as surfaces that may be painted, reflect and glow.
 
-use ::gltf::json::material::{AlphaMode, Material};
+use ::gltf::json::extensions::texture::Info as TextureExtensions;
+use ::gltf::json::material::{AlphaMode, Material, NormalTexture};
 use ::gltf::json::mesh::Semantic;
 use ::gltf::json::texture::Info;
 use ::gltf::json::validation::Checked;
@@ -58,6 +59,8 @@ pub struct Surface {
     pub opacity: f32,
     /// Its textures for that: gloss, normal and emission.
     pub maps: [Option<Map>; 3],
+    /// Factor on the slope of normals, where it is not 1.
+    pub normal_scale: Option<f32>,
     /// Linear radiance; candela per square metre are taken as W m^-2 sr^-1.
     pub emission: Vec3,
     /// Colours are a factor on the emission, where a texture varies it.
@@ -100,7 +103,10 @@ impl Surface {
         }
         let metal = textures.applied(pbr.metallic_roughness_texture.as_ref(), shape, notes)?;
         let share_of_metal = metal.as_ref().map_or(1.0, |applied| applied.texels.mean_bytes()[2]);
-        let (opacity, albedo) = passing(json, alpha, share_of_metal, albedo.min(Vec3::ONE));
+        let extensions = json.extensions.as_ref();
+        let passes = extensions.and_then(|e| e.transmission.as_ref()).and_then(|t| t.transmission_texture.as_ref());
+        let passes = textures.applied(passes, shape, notes)?.map_or(1.0, |applied| applied.texels.mean_bytes()[0]);
+        let (opacity, albedo) = passing(json, alpha, passes, share_of_metal, albedo.min(Vec3::ONE));
         let base = textures.applied(pbr.base_color_texture.as_ref(), shape, notes)?;
         // The factor's alpha is another factor of what is compared.
         let alpha_cutoff = matches!(json.alpha_mode, Checked::Valid(AlphaMode::Mask))
@@ -119,10 +125,14 @@ impl Surface {
         });
         attributes.uvs = base.and_then(|base| base.uvs);
         let is_unlit = json.extensions.as_ref().is_some_and(|e| e.unlit.is_some());
+        let normal_scale = json.normal_texture.as_ref().map(|normal| normal.scale).filter(|scale| *scale != 1.0);
+        if normal_scale.is_some_and(|scale| !scale.is_finite()) {
+            return Err(document.fail(place, "the scale of its normals is not finite"));
+        }
         let normal = json.normal_texture.as_ref().filter(|_| !is_unlit).map(|normal| Info {
             index: normal.index,
             tex_coord: normal.tex_coord,
-            extensions: None,
+            extensions: transform(normal),
             extras: Default::default(),
         });
         let normal = textures.applied(normal.as_ref(), shape, notes)?;
@@ -149,18 +159,25 @@ impl Surface {
                 Glow::Varied(colors) => attributes.colors = Some(colors),
             }
         }
-        Ok(Surface { albedo, paint, gloss, has_backs, opacity, maps, emission, attributes })
+        Ok(Surface { albedo, paint, gloss, has_backs, opacity, maps, normal_scale, emission, attributes })
     }
 }
 
+/// The transform of a texture of normals, which the reader of glTF files leaves as it is written.
+fn transform(normal: &NormalTexture) -> Option<TextureExtensions> {
+    let written = normal.extensions.as_ref()?.others.clone();
+    serde_json::from_value(written.into()).ok()
+}
+
 /// The share of light that a material keeps back, and its base colour less what passes in place of being reflected.
-fn passing(json: &Material, alpha: f32, metal: f32, albedo: Vec3) -> (f32, Vec3) {
+/// `passes` and `metal` are means of textures.
+fn passing(json: &Material, alpha: f32, passes: f32, metal: f32, albedo: Vec3) -> (f32, Vec3) {
     let alpha = match json.alpha_mode {
         Checked::Valid(AlphaMode::Blend) => alpha.clamp(0.0, 1.0),
         _ => 1.0,
     };
     let transmission = json.extensions.as_ref().and_then(|e| e.transmission.as_ref());
-    let transmission = transmission.map_or(0.0, |t| t.transmission_factor.0.clamp(0.0, 1.0));
+    let transmission = passes * transmission.map_or(0.0, |t| t.transmission_factor.0.clamp(0.0, 1.0));
     // A metal lets nothing through.
     let passes = transmission * (1.0 - metal * json.pbr_metallic_roughness.metallic_factor.0.clamp(0.0, 1.0));
     let kept = 1.0 - passes * albedo.dot(Vec3::new(0.2126, 0.7152, 0.0722));

@@ -1,5 +1,4 @@
 //! The overlay's panels in windows of any size.
-#![cfg(feature = "view")]
 
 use egui::{Context, Event, Id, PointerButton, Pos2, Rect, pos2};
 use shadow_fields::gpu::Timing;

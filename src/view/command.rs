@@ -54,8 +54,6 @@ pub enum Command {
     SetExposure(f32),
     /// Ends the movement of a slider, so that one undo reverts all of it.
     EndSlide,
-    /// Merge variant by name (see [`crate::merge::variant::VARIANTS`]); `None` is the device's fastest.
-    SetVariant(Option<&'static str>),
     Screenshot,
     Save,
     /// Closes the window.
@@ -73,7 +71,7 @@ pub struct Changed {
     pub placements: bool,
     /// Emission of entities: merge again.
     pub emission: bool,
-    /// Switches of entities: merge again, after a bake if fields are missing ([`Editor::needs`](super::Editor::needs)).
+    /// Switches of entities: merge again, after a bake if fields are missing.
     pub roles: bool,
     /// The distant light: update its coefficients and the background, merge again.
     pub sky: bool,
@@ -83,8 +81,6 @@ pub struct Changed {
     pub selection: bool,
     /// Overlay, reference, error or running: draw again.
     pub display: bool,
-    /// Merge variant: merge again.
-    pub variant: bool,
 }
 
 impl Changed {
@@ -110,7 +106,6 @@ impl std::ops::BitOrAssign for Changed {
         self.exposure |= other.exposure;
         self.selection |= other.selection;
         self.display |= other.display;
-        self.variant |= other.variant;
     }
 }
 

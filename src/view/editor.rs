@@ -7,9 +7,6 @@ use super::pick::{EntityDrag, Shapes, unbuilt_shapes};
 use crate::asset::enclose::around_spheres;
 use crate::asset::environment::EnvironmentData;
 use crate::asset::sky::Sky;
-use crate::bake;
-use crate::field::quantity;
-use crate::scene::groups::Groups;
 use crate::scene::{Camera, Data, Entity, Placement, Scene, framing};
 use glam::{DVec3, Vec3};
 use std::collections::HashSet;
@@ -40,7 +37,6 @@ pub struct Editor {
     /// Whether the overlay is shown.
     pub overlay: bool,
     pub(super) panels: Panels,
-    variant: Option<&'static str>,
     pub(super) history: History,
     /// Emission of each entity before it stopped being a light.
     pub(super) former_emission: Vec<Option<Vec3>>,
@@ -80,7 +76,6 @@ impl Editor {
             error: false,
             overlay: true,
             panels: Panels::default(),
-            variant: None,
             history: History::default(),
             former_emission: vec![None; scene.entities.len()],
             shapes: unbuilt_shapes(&scene),
@@ -114,10 +109,6 @@ impl Editor {
         self.size
     }
 
-    pub fn variant(&self) -> Option<&'static str> {
-        self.variant
-    }
-
     /// Radiance that the exposure shows as white.
     pub fn white(&self) -> f32 {
         self.scene.data.output.white()
@@ -138,11 +129,6 @@ impl Editor {
 
     pub fn undo_count(&self) -> usize {
         self.history.undo_count()
-    }
-
-    /// Fields that a mesh needs for its entities' switches: occlusion, radiance.
-    pub fn needs(&self, mesh: usize) -> [Option<quantity::FieldKind>; 2] {
-        bake::needs(&self.scene, mesh, crate::scene::Lights::Sh, &Groups::alone(&self.scene)).fields
     }
 
     /// Advances the time by `dt_s` seconds if the motion runs. Placements depend only on the sum of all `dt_s`.
@@ -199,10 +185,6 @@ impl Editor {
             Command::EndSlide => {
                 self.history.close();
                 Effect::default()
-            }
-            Command::SetVariant(name) => {
-                self.variant = name;
-                Changed { variant: true, ..unchanged }.into()
             }
             // The window's own.
             Command::Screenshot | Command::Save | Command::Quit => Effect::default(),
@@ -271,7 +253,6 @@ impl Editor {
             error: self.error,
             overlay: self.overlay,
             panels: self.panels,
-            variant: self.variant,
             saved: self.saved.clone(),
             ..next
         };

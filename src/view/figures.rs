@@ -4,7 +4,6 @@ use super::Editor;
 use super::command::Command;
 use super::graph;
 use super::status::{Status, grouped};
-use crate::merge::variant::VARIANTS;
 use crate::scene::light;
 use egui::{RichText, Ui};
 
@@ -37,35 +36,16 @@ pub(super) fn figures(ui: &mut Ui, editor: &Editor, status: &Status<'_>, command
     ui.separator();
     sliders(ui, editor, commands);
     ui.separator();
-    egui::CollapsingHeader::new("Details").show_unindented(ui, |ui| details(ui, editor, status, commands));
+    egui::CollapsingHeader::new("Details").show_unindented(ui, |ui| details(ui, editor, status));
 }
 
-fn details(ui: &mut Ui, editor: &Editor, status: &Status<'_>, commands: &mut Vec<Command>) {
+fn details(ui: &mut Ui, editor: &Editor, status: &Status<'_>) {
     ui.label(RichText::new(status.device).strong());
     ui.label(RichText::new(status.driver).small());
-    if let Some(counts) = status.counts {
-        let entities = editor.scene().entities.len();
-        ui.label(format!("{entities} entities, {} lit vertices", grouped(status.vertices as u64)));
-        let of = |count: u64| 100.0 * count as f64 / counts.considered.max(1) as f64;
-        ui.label(format!("lookups considered {}, skipped {:.0} %", grouped(counts.considered), of(counts.skipped())));
-        let small = format!(
-            "a lookup: a cluster x a product chain x an entity; behind light {:.0} %, horizon {:.0} %, apart {:.0} %, away {:.0} %, \
-             eps {:.0} %, passed {:.0} %, covered {:.0} %",
-            of(counts.behind_light),
-            of(counts.below_horizon),
-            of(counts.apart),
-            of(counts.facing_away),
-            of(counts.below_eps),
-            of(counts.passed_by),
-            of(counts.covered)
-        );
-        ui.label(RichText::new(small).small());
-    }
-    if let Some((merged, all)) = status.merged {
-        ui.label(format!("clusters merged again {} of {}", grouped(merged as u64), grouped(all as u64)));
+    if let Some(vertices) = status.vertices {
+        ui.label(format!("{} entities, {} lit vertices", editor.scene().entities.len(), grouped(vertices as u64)));
     }
     lights(ui, editor, status);
-    variants(ui, editor, status, commands);
 }
 
 /// How many lights are computed one way and the other; each with its name where the pointer rests.
@@ -75,27 +55,6 @@ fn lights(ui: &mut Ui, editor: &Editor, status: &Status<'_>) {
     let names: Vec<String> = listed.iter().map(|(name, method)| format!("{name}: {}", method.name())).collect();
     let label = ui.label(format!("lights: {sharp} sharp, {} in bands", listed.len() - sharp));
     label.on_hover_text(names.join("\n"));
-}
-
-fn variants(ui: &mut Ui, editor: &Editor, status: &Status<'_>, commands: &mut Vec<Command>) {
-    ui.horizontal(|ui| {
-        ui.label("merge");
-        let chosen = editor.variant();
-        let text = match (chosen, status.variant) {
-            (_, None) => chosen.unwrap_or("the device's fastest").to_owned(),
-            (Some(_), Some(used)) => used.to_owned(),
-            (None, Some(used)) => format!("fastest: {used}"),
-        };
-        egui::ComboBox::from_id_salt("variant").width(180.0).selected_text(text).show_ui(ui, |ui| {
-            let choices = std::iter::once(None).chain(VARIANTS.iter().map(|v| Some(v.name)));
-            for choice in choices {
-                let picked = ui.selectable_label(chosen == choice, choice.unwrap_or("the device's fastest"));
-                if picked.clicked() && chosen != choice {
-                    commands.push(Command::SetVariant(choice));
-                }
-            }
-        });
-    });
 }
 
 fn sliders(ui: &mut Ui, editor: &Editor, commands: &mut Vec<Command>) {

@@ -10,7 +10,6 @@ use crate::error::Result;
 use crate::frame::{self, Frame};
 use crate::gpu::validation::Messages;
 use crate::gpu::{Device, heap};
-use crate::merge::variant::Variant;
 use crate::scene_buffers::limits;
 
 impl Viewer {
@@ -31,7 +30,6 @@ impl Viewer {
             self.reference = None;
             self.error_shown = None;
             self.rays = None;
-            self.counts = None;
             self.edges.clear();
             self.timings.clear();
             self.outgrown = true;
@@ -43,12 +41,6 @@ impl Viewer {
             frame.set_camera(self.editor.camera());
         }
         let Some(frame) = &mut self.frame else { return Ok(()) };
-        if changed.variant {
-            let chosen = self.editor.variant().map(Variant::named).transpose()?.or(self.setup.frame.variant);
-            let outcome = frame.set_variant(chosen);
-            self.tolerate(outcome)?;
-            return Ok(());
-        }
         if changed.emission || changed.sky || changed.roles || changed.placements {
             if frame.covers(self.editor.scene()) {
                 (self.bake, self.outgrown) = (None, false);
@@ -132,8 +124,7 @@ impl Viewer {
 
     pub(super) fn build(&mut self) -> Result<()> {
         self.settle()?;
-        let variant = self.editor.variant().map(Variant::named).transpose()?.or(self.setup.frame.variant);
-        let options = frame::Options { size: self.size, variant, ..self.setup.frame };
+        let options = frame::Options { size: self.size, ..self.setup.frame };
         let built = Frame::new(&self.baker, &self.setup.cache, self.editor.scene(), options, &|_, _, _| ());
         if let Some(frame) = self.tolerate(built)? {
             log::info!("ready: the first picture of {}", self.editor.path().display());

@@ -69,7 +69,7 @@ impl Viewer {
         let [redraws, relights] = self.refine(changed || resizes)?;
         // Clusters that were hidden during motion are lit when motion has ended.
         let stale = self.frame.as_ref().is_some_and(|frame| frame.stale_count() > 0);
-        let light = self.frame.is_some() && (pending.light() || pending.variant || stale || relights);
+        let light = self.frame.is_some() && (pending.light() || stale || relights);
         let mut frame = self.frame.as_mut();
         if let (None, Some(preview)) = (&frame, &mut self.preview) {
             // One without shadows has no suns, which stand behind the entities of the file.

@@ -56,7 +56,6 @@ fn what_is_shown_is_what_render_makes_of_the_state() {
     follows(&mut stand, "exposure");
     stand.viewer.apply(Command::SetSky(0.5)).unwrap();
     follows(&mut stand, "the sky's strength");
-    stand.viewer.apply(Command::SetVariant(Some("storage"))).unwrap();
     stand.key(Key::Escape);
 
     // A light that was none: its field is baked in the background while the old picture stays.

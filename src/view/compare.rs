@@ -2,7 +2,7 @@
 //! changes; and the error of the merge against it.
 
 use super::command::Changed;
-use super::status::ErrorScale;
+use super::panel::ErrorScale;
 use super::task::{BackgroundTask, TaskWorker};
 use super::viewer::{ERROR, REFERENCE, Viewer};
 use crate::asset::false_color::NEUTRAL;

@@ -1,7 +1,7 @@
 //! The state of the editor behind the window.
 
 use super::command::{Changed, Command, Effect, Panel};
-use super::history::History;
+use super::edit::History;
 use super::orbit_camera::OrbitCamera;
 use super::pick::{EntityDrag, Shapes, unbuilt_shapes};
 use crate::asset::enclose::around_spheres;

@@ -1,9 +1,8 @@
 //! Picking and dragging: rays from the picture into the scene.
 
 use super::command::{Changed, Command, Effect};
-use super::edit;
+use super::edit::{self, EditKind, Snapshot};
 use super::editor::Editor;
-use super::history::{EditKind, Snapshot};
 use crate::draw::camera::through_pixels;
 use crate::scene::{EntityData, Placement, Scene};
 use crate::truth::ray_mesh::RayMesh;

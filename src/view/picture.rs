@@ -1,12 +1,11 @@
 //! Draws the viewer's frames into a window, an image or files.
 
 use super::command::Changed;
+use super::follow::unlit_viewport;
 use super::outline::outline;
-use super::preview;
-use super::save::unedited;
-use super::status::HISTORY;
-use super::viewer::Previewed;
-use super::viewer::{ERROR, REFERENCE, Viewer};
+use super::scenes::unedited;
+use super::figures::HISTORY;
+use super::viewer::{ERROR, Previewed, REFERENCE, Viewer};
 use crate::asset::edges::Edges;
 use crate::asset::picture;
 use crate::draw::camera::clip_from_world;
@@ -152,7 +151,7 @@ impl Viewer {
         if self.frame.is_none() {
             return vec![match self.previewed {
                 Previewed::Light => Viewport::merged([0, 0, width, height]),
-                Previewed::Shapes | Previewed::Nothing => preview::viewport([width, height]),
+                Previewed::Shapes | Previewed::Nothing => unlit_viewport([width, height]),
             }];
         }
         let [own_width, _] = self.own_size_of([width, height]);

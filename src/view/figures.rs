@@ -7,7 +7,7 @@ use crate::bench::figures::quantiles;
 use crate::check::PASSES;
 use crate::gpu::Timing;
 use crate::scene::light;
-use egui::{Align2, Color32, FontId, Rect, RichText, Sense, Stroke, Ui, Vec2, pos2, vec2};
+use egui::{Align2, Color32, FontId, Pos2, Rect, RichText, Sense, Stroke, Ui, pos2, vec2};
 use std::collections::VecDeque;
 
 /// Width of the panel, points.
@@ -66,11 +66,7 @@ fn details(ui: &mut Ui, editor: &Editor, status: &Status<'_>) {
     if let Some(vertices) = status.vertices {
         ui.label(format!("{} entities, {} lit vertices", editor.scene().entities.len(), grouped(vertices as u64)));
     }
-    lights(ui, editor, status);
-}
-
-/// How many lights are computed one way and the other; each with its name where the pointer rests.
-fn lights(ui: &mut Ui, editor: &Editor, status: &Status<'_>) {
+    // How many lights are computed one way and the other; each with its name where the pointer rests.
     let listed = light::listed(editor.scene(), status.lights);
     let sharp = listed.iter().filter(|(_, method)| method.is_sharp()).count();
     let names: Vec<String> = listed.iter().map(|(name, method)| format!("{name}: {}", method.name())).collect();
@@ -105,22 +101,6 @@ fn sliders(ui: &mut Ui, editor: &Editor, commands: &mut Vec<Command>) {
     slide(ui, "sky turned", editor.sky_turn_deg(), -180.0..=180.0, "°", Command::SetSkyTurn);
 }
 
-/// Labels and where they stand: that of the range at the top right, and those of marks on their lines at the left. A
-/// mark whose label would overlap another or leave the graph is left out. `size` measures a text.
-fn labels(area: Rect, top: f64, size: impl Fn(&str) -> Vec2) -> Vec<(Rect, String)> {
-    let range = format!("{top} ms");
-    let corner = Align2::RIGHT_TOP.anchor_size(area.right_top(), size(&range));
-    let mut placed = vec![(corner, range)];
-    for (limit, text) in MARKS {
-        let y = area.bottom() - (limit / top) as f32 * area.height();
-        let place = Align2::LEFT_CENTER.anchor_size(pos2(area.left(), y), size(text));
-        if area.contains_rect(place) && placed.iter().all(|(other, _)| !other.intersects(place)) {
-            placed.push((place, text.to_owned()));
-        }
-    }
-    placed
-}
-
 /// Draws stacked times of the passes in milliseconds, the newest at the right.
 fn graph(ui: &mut Ui, timings: &VecDeque<Vec<Timing>>) {
     let (response, painter) = ui.allocate_painter(vec2(ui.available_width(), HEIGHT), Sense::hover());
@@ -149,15 +129,23 @@ fn graph(ui: &mut Ui, timings: &VecDeque<Vec<Timing>>) {
             bottom -= height;
         }
     }
-    let font = FontId::proportional(LEAST_TEXT);
-    let lay = |text: &str| painter.layout_no_wrap(text.to_owned(), font.clone(), Color32::WHITE);
-    let room = vec2(6.0, 0.0);
-    for (index, (place, text)) in labels(area, top, |text| lay(text).size() + room).into_iter().enumerate() {
-        if index > 0 {
-            painter.hline(area.x_range(), place.center().y, Stroke::new(1.0, Color32::from_white_alpha(70)));
-        }
+    let label = |at: Pos2, align: Align2, text: String| {
+        let text = painter.layout_no_wrap(text, FontId::proportional(LEAST_TEXT), Color32::WHITE);
+        let room = vec2(6.0, 0.0);
+        let place = align.anchor_size(at, text.size() + room);
         painter.rect_filled(place, 2.0, Color32::from_black_alpha(230));
-        painter.galley(place.min + room / 2.0, lay(&text), Color32::WHITE);
+        painter.galley(place.min + room / 2.0, text, Color32::WHITE);
+    };
+    label(area.right_top(), Align2::RIGHT_TOP, format!("{top} ms"));
+    // Labels stay within the graph and apart.
+    let mut free = area.y_range().shrink(0.75 * LEAST_TEXT);
+    for (limit, text) in MARKS {
+        let y = area.bottom() - (limit / top) as f32 * area.height();
+        if free.contains(y) {
+            painter.hline(area.x_range(), y, Stroke::new(1.0, Color32::from_white_alpha(70)));
+            label(pos2(area.left(), y), Align2::LEFT_CENTER, text.to_owned());
+            free.min = y + 1.5 * LEAST_TEXT;
+        }
     }
     ui.horizontal_wrapped(|ui| {
         for (index, name) in names.iter().enumerate() {
@@ -172,25 +160,4 @@ fn graph(ui: &mut Ui, timings: &VecDeque<Vec<Timing>>) {
             ui.label(RichText::new(text).color(PASS_COLORS[index % PASS_COLORS.len()]));
         }
     });
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn labels_stand_apart_inside_the_graph() {
-        let area = Rect::from_min_size(pos2(100.0, 50.0), vec2(250.0, HEIGHT));
-        // A line of text is at most 1.4 times as high as its size.
-        let size = |text: &str| vec2(0.6 * LEAST_TEXT * text.len() as f32 + 6.0, 1.4 * LEAST_TEXT);
-        let marked: Vec<usize> = RANGES.map(|top| labels(area, top, size).len() - 1).to_vec();
-        assert_eq!(marked, [0, 0, 1, 2, 1, 1, 0, 0, 0], "marks in each range");
-        for top in RANGES {
-            let labels = labels(area, top, size);
-            for (index, (place, text)) in labels.iter().enumerate() {
-                assert!(area.contains_rect(*place), "{text} of {top} ms: {place}");
-                assert!(labels[..index].iter().all(|(other, _)| !other.intersects(*place)), "{text} of {top} ms");
-            }
-        }
-    }
 }

@@ -12,7 +12,6 @@ mod figures;
 mod follow;
 pub mod input;
 pub mod orbit_camera;
-pub mod outline;
 mod overlay;
 pub mod panel;
 pub mod pick;

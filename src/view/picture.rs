@@ -2,17 +2,16 @@
 
 use super::command::Changed;
 use super::follow::unlit_viewport;
-use super::outline::outline;
 use super::scenes::unedited;
 use super::figures::HISTORY;
 use super::viewer::{ERROR, Previewed, REFERENCE, Viewer};
 use crate::asset::edges::Edges;
 use crate::asset::picture;
-use crate::draw::camera::clip_from_world;
+use crate::draw::camera::{clip_from_world, world_from_centred};
 use crate::error::{Error, Result};
 use crate::frame::{self, RadiositySource, Relight, Viewport, record};
 use crate::gpu::{Access, Commands, FLIGHTS, Image, Window};
-use glam::DVec2;
+use glam::{DVec2, DVec4};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
@@ -185,7 +184,7 @@ impl Viewer {
         Ok(format!("wrote {} and {}", png.display(), exr.display()))
     }
 
-    /// The outline of the selected entity in points.
+    /// The outline of the selected entity as the camera sees it, in points: its silhouette edges.
     pub(super) fn outline(&mut self) -> Vec<[egui::Pos2; 2]> {
         let Some(selected) = self.editor.selection else { return Vec::new() };
         let scene = self.editor.scene();
@@ -195,11 +194,14 @@ impl Viewer {
         let [width, height] = self.editor.size().map(f64::from);
         let camera = self.editor.camera();
         let size = DVec2::new(width, height) / f64::from(self.paint.pixels_per_point);
-        let placement = self.editor.placements()[selected];
-        let clip = clip_from_world(camera, width / height);
-        let lines = outline(edges, centre, &placement, clip, camera.eye.as_dvec3(), size);
-        let point = |p: DVec2| egui::pos2(p.x as f32, p.y as f32);
-        lines.into_iter().map(|line| line.map(point)).collect()
+        let world = world_from_centred(&self.editor.placements()[selected], centre);
+        let eye = world.inverse().transform_point3(camera.eye.as_dvec3());
+        let lines = edges.lines(clip_from_world(camera, width / height) * world, eye, false);
+        let point = |c: DVec4| {
+            let place = (DVec2::new(c.x, c.y) / c.w + 1.0) / 2.0 * size;
+            egui::pos2(place.x as f32, place.y as f32)
+        };
+        lines.into_iter().map(|line| line.ends.map(point)).collect()
     }
 }
 

@@ -36,7 +36,7 @@ fn history_is_bounded() {
     for _ in 0..2000 {
         editor.apply(Command::ToggleLight);
     }
-    assert_eq!(editor.undo_count(), shadow_fields::view::history::STEP_LIMIT);
+    assert_eq!(editor.undo_count(), shadow_fields::view::edit::STEP_LIMIT);
 }
 
 fn any_command() -> impl Strategy<Value = Command> {
@@ -87,7 +87,7 @@ proptest! {
             prop_assert!(editor.placements().iter().all(|p| p.position.is_finite() && p.scale > 0.0 && p.rotation.is_normalized()));
             done += 1;
         }
-        prop_assert!(done < shadow_fields::view::history::STEP_LIMIT);
+        prop_assert!(done < shadow_fields::view::edit::STEP_LIMIT);
         let saved = Data::parse(&editor.data(Path::new("")).to_toml().unwrap(), Path::new("p.toml"));
         prop_assert!(saved.is_ok(), "{saved:?}");
         let end = editor.scene().data.clone();

@@ -2,8 +2,7 @@
 
 use egui::{Context, Event, Id, PointerButton, Pos2, Rect, pos2};
 use shadow_fields::gpu::Timing;
-use shadow_fields::view::panel::{show, style};
-use shadow_fields::view::status::{ErrorScale, Status};
+use shadow_fields::view::panel::{ErrorScale, Status, show, style};
 use shadow_fields::view::task::TaskProgress;
 use shadow_fields::view::{Command, Editor};
 use std::collections::VecDeque;

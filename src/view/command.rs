@@ -1,11 +1,5 @@
 //! Commands of the user and their effects.
 
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Panel {
-    Keys,
-    Figures,
-}
-
 /// A command. Positions and distances in the picture are in pixels, x to the right, y down; [`Command::Resize`] sets
 /// its size.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -42,7 +36,8 @@ pub enum Command {
     ToggleOverlay,
     /// Folds or unfolds the list of keys; shows all panels with it where they are hidden.
     ToggleKeys,
-    Fold(Panel, bool),
+    /// Unfolds or folds the figures.
+    ShowFigures(bool),
     /// Slider: angle of the distant light, degrees.
     SetSkyTurn(f32),
     /// Slider: strength of the distant light.

@@ -1,6 +1,6 @@
 //! The state of the editor behind the window.
 
-use super::command::{Changed, Command, Effect, Panel};
+use super::command::{Changed, Command, Effect};
 use super::edit::History;
 use super::orbit_camera::OrbitCamera;
 use super::pick::{EntityDrag, Shapes, unbuilt_shapes};
@@ -11,13 +11,6 @@ use crate::scene::{Camera, Data, Entity, Placement, Scene, framing};
 use glam::{DVec3, Vec3};
 use std::collections::HashSet;
 use std::path::{Path, PathBuf};
-
-#[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Panels {
-    pub(super) keys: bool,
-    /// The figures; `None` where the user has not chosen.
-    pub(super) figures: Option<bool>,
-}
 
 /// The state that `view` shows and that commands change.
 pub struct Editor {
@@ -36,7 +29,10 @@ pub struct Editor {
     pub error: bool,
     /// Whether the overlay is shown.
     pub overlay: bool,
-    pub(super) panels: Panels,
+    /// Whether the list of keys is unfolded.
+    pub(super) shows_keys: bool,
+    /// Whether the figures are unfolded; `None` where the user has not chosen.
+    pub(super) shows_figures: Option<bool>,
     pub(super) history: History,
     /// Emission of each entity before it stopped being a light.
     pub(super) former_emission: Vec<Option<Vec3>>,
@@ -75,7 +71,8 @@ impl Editor {
             reference: false,
             error: false,
             overlay: true,
-            panels: Panels::default(),
+            shows_keys: false,
+            shows_figures: None,
             history: History::default(),
             former_emission: vec![None; scene.entities.len()],
             shapes: unbuilt_shapes(&scene),
@@ -171,15 +168,12 @@ impl Editor {
             Command::ToggleError => toggle(&mut self.error),
             Command::ToggleOverlay => toggle(&mut self.overlay),
             Command::ToggleKeys => {
-                self.panels.keys = !(self.panels.keys && self.overlay);
+                self.shows_keys = !(self.shows_keys && self.overlay);
                 self.overlay = true;
                 Changed { display: true, ..unchanged }.into()
             }
-            Command::Fold(panel, folds) => {
-                match panel {
-                    Panel::Keys => self.panels.keys = !folds,
-                    Panel::Figures => self.panels.figures = Some(!folds),
-                }
+            Command::ShowFigures(shows) => {
+                self.shows_figures = Some(shows);
                 Changed { display: true, ..unchanged }.into()
             }
             Command::EndSlide => {
@@ -252,7 +246,8 @@ impl Editor {
             reference: self.reference,
             error: self.error,
             overlay: self.overlay,
-            panels: self.panels,
+            shows_keys: self.shows_keys,
+            shows_figures: self.shows_figures,
             saved: self.saved.clone(),
             ..next
         };

@@ -1,7 +1,7 @@
 //! The overlay: help, times, sliders, messages, the scale of the error. It reads the state and returns the commands of its
 //! widgets.
 
-use super::command::{Command, Panel};
+use super::command::Command;
 use super::editor::Editor;
 use super::figures::{FIGURES_WIDTH, figures};
 use super::input::CONTROLS;
@@ -111,24 +111,20 @@ pub fn show(context: &Context, editor: &Editor, status: &Status<'_>) -> Vec<Comm
     if editor.overlay {
         halves(context, editor);
         let screen = context.content_rect();
-        if panel(context, "Keys (F1)", screen.left() + MARGIN, KEYS_WIDTH, editor.panels.keys, help) {
-            commands.push(Command::Fold(Panel::Keys, editor.panels.keys));
+        if panel(context, "Keys (F1)", screen.left() + MARGIN, KEYS_WIDTH, editor.shows_keys, help) {
+            commands.push(Command::ToggleKeys);
         }
-        let open = unfolds_figures(editor, screen);
+        // At first they are unfolded where that leaves enough of the window free.
+        let open = editor.shows_figures.unwrap_or(FIGURES_WIDTH * FIGURES_HEIGHT <= SHARE * screen.area());
         let width = if open { FIGURES_WIDTH } else { FOLDED_WIDTH };
         let left = (screen.right() - MARGIN - width).max(screen.left() + MARGIN);
         let add = |ui: &mut Ui| figures(ui, editor, status, &mut commands);
         if panel(context, "Figures", left, FIGURES_WIDTH, open, add) {
-            commands.push(Command::Fold(Panel::Figures, open));
+            commands.push(Command::ShowFigures(!open));
         }
     }
     notes(context, editor, status);
     commands
-}
-
-/// Whether the panel of figures is unfolded: as the user has chosen, or where it leaves enough of the window free.
-fn unfolds_figures(editor: &Editor, screen: Rect) -> bool {
-    editor.panels.figures.unwrap_or(FIGURES_WIDTH * FIGURES_HEIGHT <= SHARE * screen.area())
 }
 
 /// A panel below the window's upper edge. Returns whether its title was clicked, anywhere along its line. Its size is

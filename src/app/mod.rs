@@ -24,7 +24,7 @@ mod view;
 use crate::error::{Error, Result, one_line};
 #[cfg(all(unix, feature = "view"))]
 use crate::gpu::display;
-use crate::gpu::signals;
+use crate::gpu::process;
 use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
 pub use context::Global;
 use std::ffi::OsString;
@@ -95,7 +95,7 @@ fn parse<A: Into<OsString> + Clone>(arguments: impl IntoIterator<Item = A>) -> R
 
 /// Runs the program on the process's arguments and returns its exit code.
 pub fn main() -> ExitCode {
-    signals::fail_writes_beyond_limit();
+    process::fail_writes_beyond_limit();
     let cli = Cli::try_parse().unwrap_or_else(|error| refuse(error));
     output::start_log(&cli.global);
     match run(&cli).and_then(|()| output::written()) {
@@ -105,7 +105,7 @@ pub fn main() -> ExitCode {
             // The device of a window whose display is lost still works: exit handlers would unload what it runs.
             #[cfg(all(unix, feature = "view"))]
             if display::is_lost() {
-                signals::end_at_once(error.exit_code());
+                process::end_at_once(error.exit_code());
             }
             ExitCode::from(error.exit_code())
         }

@@ -6,7 +6,7 @@ use super::{Global, output};
 use crate::draw::Antialias;
 use crate::error::{Error, Result};
 use crate::frame::{self, RenderOptions};
-use crate::gpu::{self, Device, PresentMode, Window, display, heap};
+use crate::gpu::{self, Device, PresentMode, Window, display, process};
 use crate::scene::Scene;
 use crate::view::command::Command;
 use crate::view::editor::add_sky;
@@ -60,7 +60,7 @@ pub struct Arguments {
 
 /// Opens the window and stays until it is closed.
 pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
-    heap::share_arena();
+    process::share_arena();
     let mut scene = arguments.gltf.scene(global, &arguments.scene, 0.0)?;
     if arguments.look.environment.is_none() {
         add_sky(&mut scene);

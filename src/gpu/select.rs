@@ -4,7 +4,6 @@ use super::Checked;
 use crate::error::{Error, Result};
 use ash::vk;
 use std::ffi::CStr;
-use std::process::Command;
 
 /// One physical device, as `devices` prints it.
 #[derive(Clone, Debug)]
@@ -177,21 +176,6 @@ pub(super) fn describe(instance: &ash::Instance, index: usize, physical: vk::Phy
         uuid: identity.device_uuid.iter().map(|byte| format!("{byte:02x}")).collect(),
         counts_samples,
         unsuitable,
-    }
-}
-
-/// Cores of this machine that the process may use.
-pub fn cores() -> usize {
-    std::thread::available_parallelism().map_or(1, |cores| cores.get())
-}
-
-/// Gives a new process, one of so many at a time, its share of the cores as threads of llvmpipe besides the one that
-/// asks for a drawing, unless the environment says how many. Where every core has a process, none: with a thread
-/// besides, two processes on two cores took 11.1 s for what they did in 10.3 s without.
-pub fn share_cores(command: &mut Command, processes: usize) {
-    if std::env::var_os("LP_NUM_THREADS").is_none() {
-        let threads = if processes >= cores() { 0 } else { cores() / processes };
-        command.env("LP_NUM_THREADS", threads.to_string());
     }
 }
 

@@ -90,7 +90,9 @@ impl Editor {
             Command::ToggleLight => self.toggle_light(),
             Command::Undo => self.travel(false),
             Command::Redo => self.travel(true),
-            Command::SetSkyTurn(turn_deg) => self.set_environment(EditKind::SkyTurn, |e| e.turn_deg = wrapped(turn_deg)),
+            Command::SetSkyTurn(turn_deg) => {
+                self.set_environment(EditKind::SkyTurn, |e| e.turn_deg = wrapped(turn_deg))
+            }
             Command::SetSky(strength) => self.set_environment(EditKind::Sky, |e| e.strength = strength),
             Command::SetLight(ev) => self.set_light(ev),
             Command::SetExposure(ev) => self.set_exposure(ev),

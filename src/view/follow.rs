@@ -12,7 +12,7 @@ use crate::draw::show::Show;
 use crate::error::Result;
 use crate::frame::{self, Frame, RadiositySource, Viewport};
 use crate::gpu::validation::Messages;
-use crate::gpu::{Device, Timing, heap};
+use crate::gpu::{Device, Timing, process};
 use crate::scene::motion::RotationData;
 use crate::scene::{EntityData, Placement, Scene};
 use crate::scene_buffers::limits;
@@ -101,7 +101,7 @@ impl Viewer {
     pub(super) fn give_back(&mut self) {
         if self.drawn_before.is_some_and(|before| self.frame_count > before) {
             self.drawn_before = None;
-            heap::give_back();
+            process::give_back();
         }
     }
 

@@ -33,7 +33,6 @@ const FIGURES_HEIGHT: f32 = 300.0;
 const SHARE: f32 = 0.2;
 const OUTLINE: Color32 = Color32::from_rgb(255, 200, 60);
 
-
 /// The error that the colours show.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ErrorScale {

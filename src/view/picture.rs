@@ -1,9 +1,9 @@
 //! Draws the viewer's frames into a window, an image or files.
 
 use super::command::Changed;
+use super::figures::HISTORY;
 use super::follow::unlit_viewport;
 use super::scenes::unedited;
-use super::figures::HISTORY;
 use super::viewer::{ERROR, Previewed, REFERENCE, Viewer};
 use crate::asset::edges::Edges;
 use crate::asset::picture;

@@ -157,8 +157,7 @@ pub fn assert_clean(what: &str, heard: &Heard) {
 /// Calls whose failure changes nothing that a user asked for: names for debuggers, the pipeline cache, and waiting for
 /// what has ended.
 fn is_forgiven(call: Call) -> bool {
-    let forgiven =
-        ["vkSetDebugUtilsObjectNameEXT", "vkGetPipelineCacheData", "vkDeviceWaitIdle", "vkWaitForFences"];
+    let forgiven = ["vkSetDebugUtilsObjectNameEXT", "vkGetPipelineCacheData", "vkDeviceWaitIdle", "vkWaitForFences"];
     forgiven.contains(&call.name)
 }
 

@@ -102,7 +102,7 @@ fn a_gltf_file_moves_in_the_window() {
     let pictures: std::collections::BTreeSet<Vec<u8>> = pictures.collect();
     assert_eq!(pictures.len(), 3, "each picture of the motion is another");
 
-    let mut view = View::open(&display, folder.path(), &format!("view robot.glb {OPTIONS} {COARSE}"));
+    let view = View::open(&display, folder.path(), &format!("view robot.glb {OPTIONS} {COARSE}"));
     // Once the first picture is there, another follows.
     for _ in 0..2 {
         let first = display.look(SIZE);

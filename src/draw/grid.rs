@@ -82,7 +82,6 @@ impl DrawnGrid {
         TexelView::fits(device, QUADS, 16 * cells as u64) && TexelView::fits(device, QUAD_FORMAT, 16 * vertices as u64)
     }
 
-    /// Device memory, bytes.
     pub fn size_bytes(&self) -> u64 {
         let own = [&self.positions, &self.places, &self.indices, &self.corners];
         own.into_iter().chain(&self.patches).map(|buffer| buffer.size_bytes).sum()

@@ -94,7 +94,6 @@ impl DrawnMesh {
         if let DrawnMesh::Grid(grid, _) = self { Some(grid) } else { None }
     }
 
-    /// Device memory, bytes.
     pub fn size_bytes(&self) -> u64 {
         match self {
             DrawnMesh::Triangles(triangles) => triangles.size_bytes(),
@@ -124,7 +123,6 @@ pub struct DrawnEntity<'d> {
     pub paint: Option<DrawnPaint<'d>>,
     /// How it reflects besides diffusely.
     pub gloss: Option<DrawnGloss<'d>>,
-    /// Input of its pixels, where they evaluate sharp lights.
     pub by_pixel: Option<ByPixel>,
 }
 
@@ -224,7 +222,6 @@ fn made_once(
     Ok(made.get().expect("it was made"))
 }
 
-/// The pipelines and their images.
 pub struct Draw {
     triangles: DrawTriangles,
     grid: DrawGrid,

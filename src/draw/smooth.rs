@@ -56,7 +56,6 @@ impl Strips {
         }
     }
 
-    /// The number of lines that were added.
     pub fn count(&self) -> usize {
         self.corners.len() / 4
     }
@@ -93,7 +92,6 @@ pub struct Lines {
 }
 
 impl Lines {
-    /// No lines yet.
     pub fn new(device: &Arc<Device>) -> Result<Self> {
         Ok(Lines {
             corners: Upload::new(device, "line corners", 16)?,
@@ -113,13 +111,11 @@ impl Lines {
         self.indices.write(&indices)
     }
 
-    /// Device memory, bytes.
     pub fn size_bytes(&self) -> u64 {
         self.corners.all_bytes() + self.marks.all_bytes() + self.indices.all_bytes()
     }
 }
 
-/// The pipeline and its picture.
 pub struct Smooth {
     pipeline: GraphicsPipeline,
     pub picture: Image,

@@ -29,7 +29,6 @@ const LEAST_PX: f64 = 4.0;
 /// How much nearer triangles are drawn that are drawn again, in steps of depth: their corners round as they did before.
 const NEARER_STEPS: f32 = 4.0;
 
-/// A mesh's triangles on the device.
 pub struct DrawnTriangles {
     /// Positions in metres from the centre of the bounding sphere.
     pub positions: Buffer,
@@ -78,7 +77,6 @@ impl DrawnTriangles {
         })
     }
 
-    /// Device memory, bytes.
     pub fn size_bytes(&self) -> u64 {
         let paint = self.paint.as_ref().map_or(0, |paint| paint.size_bytes);
         self.positions.size_bytes + self.emission.size_bytes + self.indices.size_bytes + paint
@@ -129,7 +127,6 @@ impl DrawnPaint<'_> {
     }
 }
 
-/// How a surface looks.
 #[derive(Clone, Copy)]
 pub enum Look<'p> {
     /// One reflectance.

@@ -54,7 +54,6 @@ pub(super) fn reflections(
 struct ShownLights {
     /// Number, place and radius in metres, and the sum of its colours.
     lights: Vec<(usize, DVec3, f64, f64)>,
-    /// Bounding spheres of all entities.
     spheres: Vec<(DVec3, f64)>,
 }
 
@@ -131,7 +130,6 @@ impl Frame {
         self.reflections.as_mut().map_or(Ok(()), |reflections| reflections.entities.write(&entities))
     }
 
-    /// How the pixels of an entity reflect.
     pub(super) fn drawn_gloss(&self, entity: &Entity) -> Option<DrawnGloss<'_>> {
         let detail = detail(entity)?;
         let MapIndices { gloss, normal, glow, .. } = entity.maps;
@@ -139,7 +137,6 @@ impl Frame {
         Some(DrawnGloss { detail, maps: [gloss, normal, glow].map(texture) })
     }
 
-    /// What the pass "gloss" works on.
     pub(super) fn gloss_work(&self) -> Option<(&Reflections, ReflectionInputs<'_>)> {
         let inputs = ReflectionInputs {
             vertices: &self.buffers.vertices,
@@ -173,7 +170,6 @@ impl Frame {
         Ok([found.collect(), wanted.collect()])
     }
 
-    /// What pixels read of reflections.
     pub(super) fn drawn_reflections(&self) -> Option<DrawnReflections<'_>> {
         let of = |reflections| DrawnReflections {
             reflections,

@@ -12,7 +12,6 @@ pub struct Memory {
     pub fields: u64,
     /// Silhouette fields and self-visibility, for sharp lights.
     pub silhouettes: u64,
-    /// Transfer vectors.
     pub transfers: u64,
     /// Positions and normals that the merge reads.
     pub vertices: u64,

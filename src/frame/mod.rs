@@ -78,7 +78,6 @@ pub struct Frame {
     groups: Groups,
     /// What the own visibility of the vertices was baked for.
     surfaces: SurfacePlan,
-    /// How the light of each entity is computed.
     methods: Vec<LightMethod>,
     options: Options,
     /// Baked and uploaded data.
@@ -95,7 +94,6 @@ pub struct Frame {
     radiosity: RadiosityBuffers,
     /// What passes light on within rigid groups, where it bounces.
     bounce: Option<Bounce>,
-    /// What glossy surfaces reflect.
     reflections: Option<Reflections>,
     picture: FramePicture,
 }
@@ -332,7 +330,6 @@ impl Frame {
         })
     }
 
-    /// Order in which an entity's vertices are stored.
     fn order(&self, entity: usize) -> &[u32] {
         &self.buffers.surface(entity).order
     }
@@ -381,7 +378,6 @@ impl Frame {
         self.merge.permutation.variant
     }
 
-    /// What its merge was compiled for.
     pub fn permutation(&self) -> MergePermutation {
         self.merge.permutation
     }
@@ -391,7 +387,6 @@ impl Frame {
         self.work.merged
     }
 
-    /// Vertices that are lit.
     pub fn receiver_vertex_count(&self) -> usize {
         self.work.lists.clusters.iter().map(|cluster| cluster.vertex_count as usize).sum()
     }

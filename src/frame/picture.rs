@@ -21,7 +21,6 @@ use std::collections::HashSet;
 use std::ops::Range;
 use std::sync::Arc;
 
-/// A way to make pictures.
 pub(super) struct Drawer {
     pub draw: Draw,
     pixels: Option<SharpPermutation>,
@@ -169,7 +168,6 @@ impl Frame {
         Ok(self.sharp.as_ref().is_some_and(|sharp| sharp.permutation.edges != self.wants_edges()))
     }
 
-    /// Whether pictures are refined.
     pub fn is_refined(&self) -> bool {
         self.picture.refined
     }

@@ -72,7 +72,6 @@ impl Access {
         }
     }
 
-    /// Whether the access may change the resource.
     pub fn writes(self) -> bool {
         matches!(self, Access::TransferWrite | Access::ComputeWrite | Access::ColorWrite | Access::DepthWrite)
     }
@@ -181,7 +180,6 @@ impl Tracker {
         uses.push(Use { order: self.order, range, access, pass: pass.to_owned() });
     }
 
-    /// Reports all objections together.
     pub fn verdict(&self) -> Result<()> {
         if self.objections.is_empty() {
             return Ok(());

@@ -26,7 +26,6 @@ pub struct Census {
 }
 
 impl Census {
-    /// Counts a shader.
     pub fn new(shader: &Shader) -> Result<Self> {
         let module = rspirv::dr::load_words(&shader.spirv)
             .map_err(|error| Error::Failed(format!("{}: unreadable SPIR-V: {error}", shader.name)))?;
@@ -38,7 +37,6 @@ impl Census {
         Ok(census)
     }
 
-    /// Number of texels fetched from all bindings.
     pub fn fetch_count(&self) -> u32 {
         self.fetches.values().sum()
     }

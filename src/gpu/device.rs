@@ -28,7 +28,6 @@ pub fn required_features() -> vk::PhysicalDeviceVulkan13Features<'static> {
     vk::PhysicalDeviceVulkan13Features::default().dynamic_rendering(true).synchronization2(true)
 }
 
-/// Parts of a [`Device`].
 pub(super) struct Parts {
     pub physical: vk::PhysicalDevice,
     pub handle: ash::Device,
@@ -45,7 +44,6 @@ pub struct Device {
     pub(super) handle: ash::Device,
     #[cfg(feature = "view")]
     pub(super) physical: vk::PhysicalDevice,
-    /// Whether a caller made it, uses its queue too and destroys it.
     is_shared: bool,
     pub(super) queue: Mutex<vk::Queue>,
     /// Fences of launched recordings; see `flight`.
@@ -55,11 +53,8 @@ pub struct Device {
     pub(super) names: Option<ash::ext::debug_utils::Device>,
     pub(super) pipeline_cache: vk::PipelineCache,
     pipeline_key: String,
-    /// Limits of the physical device.
     pub limits: vk::PhysicalDeviceLimits,
-    /// Name, driver and kind of the physical device.
     pub info: Candidate,
-    /// Folder for compiled shaders and the pipeline cache.
     pub cache_dir: Option<PathBuf>,
     pub(super) next_resource: AtomicU64,
     omitted_barrier: AtomicUsize,
@@ -183,7 +178,6 @@ impl Device {
         limits.max_image_dimension2_d.min(limits.max_framebuffer_width).min(limits.max_framebuffer_height)
     }
 
-    /// Messages of the validation layer since the last call.
     pub fn take_validation_messages(&self) -> Vec<String> {
         self.instance.messages.take()
     }

@@ -18,7 +18,6 @@ type SetExitHandler = unsafe extern "C" fn(*mut c_void, Option<ExitHandler>, *mu
 type ConnectionOf = unsafe extern "C" fn(*mut c_void) -> *mut c_void;
 type HasError = unsafe extern "C" fn(*mut c_void) -> c_int;
 
-/// A display that is open.
 struct Watched {
     connection: *mut c_void,
     has_error: HasError,
@@ -46,7 +45,6 @@ pub fn is_lost() -> bool {
     LOST.load(Ordering::Relaxed) || watched.as_ref().is_some_and(has_error)
 }
 
-/// The error of a lost display.
 pub fn lost() -> Error {
     Error::Device("the display was lost".into())
 }

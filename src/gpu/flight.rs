@@ -15,10 +15,8 @@ pub const FLIGHTS: usize = 2;
 /// Largest number of timed passes in one recording; each pass takes two timestamps.
 pub(super) const MAX_PASSES: u32 = 64;
 
-/// Duration of one pass on the device.
 #[derive(Clone, Debug)]
 pub struct Timing {
-    /// Name of the pass.
     pub pass: String,
     /// Milliseconds between the timestamps around it.
     pub milliseconds: f64,
@@ -26,7 +24,6 @@ pub struct Timing {
     pub samples: Option<u64>,
 }
 
-/// Semaphores around a submission.
 #[derive(Default)]
 pub(super) struct Signals {
     /// Colour attachments are written only after this is signalled.
@@ -256,7 +253,6 @@ impl Device {
         }
     }
 
-    /// The queue, locked for one user at a time.
     pub(super) fn queue(&self) -> MutexGuard<'_, vk::Queue> {
         self.queue.lock().unwrap_or_else(|poisoned| poisoned.into_inner())
     }

@@ -9,14 +9,10 @@ use std::any::Any;
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
 
-/// Format, size and sample count of an image.
 #[derive(Clone, Copy, Debug)]
 pub struct ImageShape {
-    /// Texel format.
     pub format: vk::Format,
-    /// Width in texels.
     pub width: u32,
-    /// Height in texels.
     pub height: u32,
     /// Samples per texel: 1 or 4.
     pub samples: u32,
@@ -50,9 +46,7 @@ pub struct Image {
     handle: ImageHandle,
     memory: Option<Allocation>,
     levels: u32,
-    /// Format and size.
     pub shape: ImageShape,
-    /// Name shown in messages and debuggers.
     pub name: String,
     pub(super) id: u64,
 }

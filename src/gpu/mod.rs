@@ -3,6 +3,9 @@
 //! It knows nothing of spherical harmonics, fields or scenes, and it holds all of the crate's `unsafe`. Every Vulkan
 //! object has one owner whose `Drop` destroys it; every owner keeps the [`Device`] alive.
 
+// All but `Gpu`, `DeviceOptions` and `Validation` stands below the front door.
+#![allow(missing_docs)]
+
 pub mod access;
 pub mod census;
 pub mod commands;

@@ -169,14 +169,11 @@ impl Drop for PipelineHandle {
 pub struct ComputePipeline {
     handle: PipelineHandle,
     pub(super) layout: Layout,
-    /// Workgroup size.
     pub local_size: [u32; 3],
-    /// Name of the pass.
     pub name: String,
 }
 
 impl ComputePipeline {
-    /// Builds the pipeline.
     pub fn new(device: &Arc<Device>, name: &str, shader: &Shader) -> Result<Self> {
         let layout = Layout::new(device, name, &[shader])?;
         let local_size = shader.reflection.local_size;
@@ -203,13 +200,11 @@ impl ComputePipeline {
 /// Which of the values that are drawn at a pixel it keeps, channel by channel.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Keeps {
-    /// The last.
     Last,
     /// The largest, also of what the attachment held before.
     Largest,
     /// The last over what was there before, by its alpha, with which its colour is premultiplied.
     Over,
-    /// Depth alone.
     Depth,
     /// As [`Keeps::Over`], of what is at least as near as its depth; alpha and depth stay what they were.
     ColorOver,
@@ -219,13 +214,10 @@ pub enum Keeps {
 /// front faces, and dynamic viewport, scissor and culling.
 #[derive(Clone, Copy, Debug)]
 pub struct GraphicsState {
-    /// Colour attachment format.
     pub color: vk::Format,
     /// Depth attachment format. If present, depth is tested and written, and greater is nearer (reversed depth).
     pub depth: Option<vk::Format>,
-    /// Samples per pixel.
     pub samples: u32,
-    /// Which value a pixel keeps of those that are drawn there.
     pub keeps: Keeps,
     /// How much nearer everything is drawn than it is, in steps of the largest depth of its triangle.
     pub nearer_steps: f32,
@@ -246,14 +238,11 @@ pub struct GraphicsPipeline {
     handle: PipelineHandle,
     pub(super) layout: Layout,
     pub(super) inputs: Vec<VertexInput>,
-    /// Fixed-function state.
     pub state: GraphicsState,
-    /// Name of the pass.
     pub name: String,
 }
 
 impl GraphicsPipeline {
-    /// Builds the pipeline.
     pub fn new(
         device: &Arc<Device>,
         name: &str,

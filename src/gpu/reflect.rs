@@ -17,16 +17,13 @@ pub struct Binding {
     pub name: String,
     /// Storage or uniform block, texel buffer, image (`texture2D`), or image with a sampler (`sampler2D`).
     pub kind: vk::DescriptorType,
-    /// Whether the shader may write it.
     pub writes: bool,
     /// Bytes of the fixed part of the block; 0 for texels and images.
     pub block_bytes: u32,
 }
 
-/// One vertex attribute.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct VertexInput {
-    /// `location`.
     pub location: u32,
     /// Number of floats, 1 to 4.
     pub components: u32,
@@ -35,7 +32,6 @@ pub struct VertexInput {
 /// Byte offsets of a struct's members, by name, in order of declaration.
 pub type StructLayout = Vec<(String, u32)>;
 
-/// The declarations of one module.
 #[derive(Clone, Debug, Default)]
 pub struct Reflection {
     /// Bindings that the optimised code still uses, by index.
@@ -44,7 +40,6 @@ pub struct Reflection {
     pub push_bytes: u32,
     /// Memory that the invocations of a workgroup share, bytes.
     pub shared_bytes: u32,
-    /// Workgroup size of a compute shader.
     pub local_size: [u32; 3],
     /// Vertex inputs by location; empty for other stages.
     pub inputs: Vec<VertexInput>,
@@ -55,7 +50,6 @@ pub struct Reflection {
 }
 
 impl Reflection {
-    /// Reads a module's declarations.
     pub fn new(spirv: &[u32]) -> Result<Self> {
         let mut declarations = Declarations(Loader::new());
         match parse_words(spirv, &mut declarations) {
@@ -258,7 +252,6 @@ impl<'m> Reader<'m> {
         Ok(Binding { index, name, kind, writes, block_bytes })
     }
 
-    /// Components of a scalar or vector type.
     pub(super) fn components(&self, of: u32) -> u32 {
         match self.definitions[&of].class.opcode {
             Op::TypeVector => literal(self.definitions[&of].operands.get(1)),

@@ -5,14 +5,20 @@ use crate::error::{Error, Result};
 use ash::vk;
 use std::ffi::CStr;
 
+/// Kinds of devices, the best first.
+const KINDS: [(vk::PhysicalDeviceType, &str); 4] = [
+    (vk::PhysicalDeviceType::DISCRETE_GPU, "discrete"),
+    (vk::PhysicalDeviceType::INTEGRATED_GPU, "integrated"),
+    (vk::PhysicalDeviceType::VIRTUAL_GPU, "virtual"),
+    (vk::PhysicalDeviceType::CPU, "cpu"),
+];
+
 /// One physical device, as `devices` prints it.
 #[derive(Clone, Debug)]
 pub struct Candidate {
     /// Position in the loader's list; `--device INDEX` names it.
     pub index: usize,
-    /// The driver's name of the device.
     pub name: String,
-    /// Kind of device.
     pub kind: vk::PhysicalDeviceType,
     /// Highest supported Vulkan version, as `major.minor.patch`.
     pub api: String,
@@ -37,25 +43,12 @@ impl Candidate {
         self.name.contains("SwiftShader")
     }
 
-    /// One word for the kind.
     pub fn kind_name(&self) -> &'static str {
-        match self.kind {
-            vk::PhysicalDeviceType::DISCRETE_GPU => "discrete",
-            vk::PhysicalDeviceType::INTEGRATED_GPU => "integrated",
-            vk::PhysicalDeviceType::VIRTUAL_GPU => "virtual",
-            vk::PhysicalDeviceType::CPU => "cpu",
-            _ => "other",
-        }
+        KINDS.iter().find(|(kind, _)| *kind == self.kind).map_or("other", |(_, name)| name)
     }
 
     fn rank(&self) -> usize {
-        match self.kind {
-            vk::PhysicalDeviceType::DISCRETE_GPU => 0,
-            vk::PhysicalDeviceType::INTEGRATED_GPU => 1,
-            vk::PhysicalDeviceType::VIRTUAL_GPU => 2,
-            vk::PhysicalDeviceType::CPU => 3,
-            _ => 4,
-        }
+        KINDS.iter().position(|(kind, _)| *kind == self.kind).unwrap_or(KINDS.len())
     }
 }
 
@@ -124,7 +117,6 @@ pub(super) fn physical_devices(instance: &ash::Instance) -> Result<Vec<(vk::Phys
     Ok(handles.into_iter().enumerate().map(|(index, handle)| (handle, describe(instance, index, handle))).collect())
 }
 
-/// Properties of one physical device.
 pub(super) fn describe(instance: &ash::Instance, index: usize, physical: vk::PhysicalDevice) -> Candidate {
     // SAFETY: for the whole block, queries on live handles with structs that outlive the calls; the 1.3 structs are
     // only chained if the device supports 1.3.

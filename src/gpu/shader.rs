@@ -10,11 +10,8 @@ use std::sync::OnceLock;
 /// Pipeline stage of a shader, given by the file ending of its entry point.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Stage {
-    /// `.comp`
     Compute,
-    /// `.vert`
     Vertex,
-    /// `.frag`
     Fragment,
 }
 
@@ -32,11 +29,9 @@ impl Stage {
 pub struct ShaderSource<'a> {
     /// File name, for messages.
     pub name: &'a str,
-    /// Stage it is compiled for.
     pub stage: Stage,
     /// GLSL text of the entry point.
     pub text: String,
-    /// Macros, name and value.
     pub defines: &'a [(String, String)],
     /// Text of an included file by the name in the `#include` line.
     pub include: &'a dyn Fn(&str) -> Option<String>,
@@ -45,13 +40,10 @@ pub struct ShaderSource<'a> {
 /// Compiled code and its reflection.
 #[derive(Clone, Debug)]
 pub struct Shader {
-    /// File name of the entry point.
     pub name: String,
-    /// Stage it was compiled for.
     pub stage: Stage,
     /// SPIR-V 1.5 words.
     pub spirv: Vec<u32>,
-    /// Bindings, blocks, local size, constants.
     pub reflection: Reflection,
 }
 

@@ -12,9 +12,7 @@ use std::sync::Arc;
 
 /// Texels of one level of detail; rows from the top.
 pub struct Level<'t> {
-    /// Width in texels.
     pub width: u32,
-    /// Height in texels.
     pub height: u32,
     /// Texels, as many as that, in the texture's format.
     pub bytes: &'t [u8],
@@ -89,7 +87,6 @@ impl Texture {
         commands.submit().map(|_| ())
     }
 
-    /// What a descriptor holds.
     pub(super) fn descriptor(&self) -> vk::DescriptorImageInfo {
         vk::DescriptorImageInfo {
             sampler: self.sampler.1,

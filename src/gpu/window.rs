@@ -94,7 +94,6 @@ impl Drop for WindowSurface {
     }
 }
 
-/// A semaphore with its owner.
 struct Semaphore(Arc<Device>, vk::Semaphore);
 
 impl Semaphore {
@@ -138,7 +137,6 @@ impl Drop for SwapchainHandle {
     }
 }
 
-/// A swapchain of one size with its images.
 struct Swapchain {
     images: Vec<Arc<Image>>,
     /// Signalled when an image is drawn. There is one per image, because only acquiring the image again shows that its
@@ -262,9 +260,6 @@ impl Window {
     /// Launches a recording that draws into the shot's image and leaves it as
     /// [`Access::Present`](super::Access::Present), and shows it. A swapchain that no longer fits is rebuilt by the
     /// next [`Window::acquire`]; if it fits so little that nothing is shown, the answer is false.
-    ///
-    /// # Panics
-    /// When the shot belongs to another swapchain, because [`Window::resize`] was called in between.
     pub fn present(&mut self, commands: Commands<'_>, shot: &Shot) -> Result<(Flight, bool)> {
         let chain = self.chain.as_ref().expect("a shot is presented before the window changes");
         assert!(Arc::ptr_eq(&chain.images[shot.index as usize], &shot.image), "a shot of another swapchain");

@@ -78,14 +78,12 @@ impl DeviceMesh {
     }
 }
 
-/// The data of a scene on the device.
 pub struct SceneBuffers {
     pub fields: Buffer,
     pub silhouettes: Silhouettes,
     /// Cells of self-visibility, [`self_visibility::CELLS`] of two words a vertex of the lit meshes that can shadow
     /// themselves.
     pub self_cells: Buffer,
-    /// Transfer vectors of all receivers' meshes.
     pub transfers: Buffer,
     /// Positions and normals of all meshes, one quad for each.
     pub vertices: Buffer,
@@ -97,7 +95,6 @@ pub struct SceneBuffers {
     pub surfaces: Vec<DeviceSurface>,
     /// The scene's textures; those that are equal are shared.
     pub textures: Vec<Arc<Texture>>,
-    /// The surface of each entity.
     surface_of: Vec<usize>,
     /// The bakes that were not found in the cache.
     pub baked: Vec<Baked>,
@@ -225,7 +222,6 @@ impl SceneBuffers {
         Some([nodes.low.extend(1.0 / nodes.step_m).to_array(), counts.to_array()])
     }
 
-    /// Whether any surface has maps of self-visibility.
     pub fn has_self_shadows(&self) -> bool {
         self.surfaces.iter().any(|surface| surface.self_first != NONE)
     }
@@ -236,13 +232,11 @@ impl SceneBuffers {
         blocked.as_ref().is_some_and(|slot| slot.extent != Extent::Nothing)
     }
 
-    /// Device memory of all textures, bytes.
     pub fn texture_bytes(&self) -> u64 {
         let is_first = |i: &usize| !self.textures[..*i].iter().any(|other| Arc::ptr_eq(other, &self.textures[*i]));
         (0..self.textures.len()).filter(is_first).map(|i| self.textures[i].size_bytes).sum()
     }
 
-    /// The surface of an entity.
     pub fn surface(&self, entity: usize) -> &DeviceSurface {
         &self.surfaces[self.surface_of[entity]]
     }

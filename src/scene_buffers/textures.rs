@@ -18,7 +18,6 @@ const FORMAT: vk::Format = vk::Format::R8G8B8A8_SRGB;
 pub enum Content {
     /// Colours, sRGB.
     Colors,
-    /// Numbers.
     Numbers,
 }
 

@@ -36,7 +36,6 @@ pub enum Command {
     ToggleOverlay,
     /// Folds or unfolds the list of keys; shows all panels with it where they are hidden.
     ToggleKeys,
-    /// Unfolds or folds the figures.
     ShowFigures(bool),
     /// Slider: angle of the distant light, degrees.
     SetSkyTurn(f32),
@@ -51,7 +50,6 @@ pub enum Command {
     EndSlide,
     Screenshot,
     Save,
-    /// Closes the window.
     Quit,
 }
 
@@ -84,7 +82,6 @@ impl Changed {
         self.scene || self.placements || self.emission || self.roles || self.sky
     }
 
-    /// Whether anything changed.
     pub fn any(&self) -> bool {
         *self != Changed::default()
     }

@@ -18,7 +18,6 @@ const RUNS: u32 = 4;
 /// Number of vertices between two checks whether to stop.
 const CHUNK: usize = 512;
 
-/// The result of a round.
 pub(super) struct Reference {
     /// Version of the light for which it was cast, as the caller counts versions.
     pub(super) version: u64,
@@ -90,7 +89,6 @@ impl Viewer {
     }
 }
 
-/// Starts casting for the current state of a scene.
 fn cast(scene: Scene, placements: Vec<Placement>, version: u64, seed: u64) -> BackgroundTask<Reference> {
     BackgroundTask::new(move |worker: &TaskWorker<Reference>| {
         let shapes = RayMeshes::new(&scene);

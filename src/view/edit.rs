@@ -76,14 +76,12 @@ impl History {
         true
     }
 
-    /// Number of changes that can be undone.
     pub fn undo_count(&self) -> usize {
         self.done.len()
     }
 }
 
 impl Editor {
-    /// Executes a command that changes the scene.
     pub(super) fn change(&mut self, command: Command) -> Effect {
         self.drag = None;
         match command {
@@ -190,7 +188,6 @@ impl Editor {
         });
     }
 
-    /// Undo or redo.
     fn travel(&mut self, forth: bool) -> Effect {
         let mut changed = Changed::default();
         let scene = &mut self.scene;

@@ -21,13 +21,11 @@ pub struct Editor {
     /// The selected entity; `None` if none is selected.
     pub selection: Option<usize>,
     pub time_s: f64,
-    /// Whether the motion runs.
     pub running: bool,
     /// Whether the ray-cast reference is shown beside the merged picture.
     pub reference: bool,
     /// Whether the error is shown in false colour.
     pub error: bool,
-    /// Whether the overlay is shown.
     pub overlay: bool,
     /// Whether the list of keys is unfolded.
     pub(super) shows_keys: bool,
@@ -97,7 +95,6 @@ impl Editor {
         &self.scene.data.camera
     }
 
-    /// Current placements of the entities, in order.
     pub fn placements(&self) -> Vec<Placement> {
         self.scene.at(self.time_s)
     }

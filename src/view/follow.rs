@@ -57,7 +57,6 @@ impl Pace {
 }
 
 impl Viewer {
-    /// Updates the frame to the editor's state.
     pub(super) fn follow(&mut self, changed: Changed) -> Result<()> {
         if !changed.any() {
             return Ok(());
@@ -233,7 +232,6 @@ impl Viewer {
         Ok([true, frame.refine(refines)?])
     }
 
-    /// Whether the picture is refined.
     pub fn is_refined(&self) -> bool {
         self.frame.as_ref().is_some_and(|frame| frame.is_refined())
     }

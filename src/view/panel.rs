@@ -33,7 +33,6 @@ const FIGURES_HEIGHT: f32 = 300.0;
 const SHARE: f32 = 0.2;
 const OUTLINE: Color32 = Color32::from_rgb(255, 200, 60);
 
-/// The error that the colours show.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ErrorScale {
     /// Root mean square of the error, relative to that of the reference.
@@ -61,7 +60,6 @@ pub struct Status<'s> {
     pub reference: Option<(u32, f64, bool)>,
     /// Error, and whether it is up to date.
     pub error: Option<(ErrorScale, bool)>,
-    /// The compiler's messages.
     pub shader_error: Option<&'s str>,
     /// Messages for the user, oldest first.
     pub messages: Vec<&'s str>,

@@ -4,12 +4,10 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant, SystemTime};
 
-/// Interval between two polls.
 pub const PERIOD: Duration = Duration::from_millis(250);
 
 type Stamps = BTreeMap<String, (Option<SystemTime>, u64)>;
 
-/// Watches a folder of shader files.
 pub struct Watch {
     folder: PathBuf,
     stamps: Stamps,

@@ -140,7 +140,6 @@ impl Editor {
         data
     }
 
-    /// Writes the state as a scene file.
     pub fn save(&mut self, path: &Path) -> Result<()> {
         let data = self.data(path.parent().unwrap_or(Path::new("")));
         let head = "Written by shadow-fields view; `shadow-fields render` gives the same picture.";

@@ -32,7 +32,6 @@ use std::time::{Duration, Instant};
 pub(super) const REFERENCE: usize = 0;
 pub(super) const ERROR: usize = 1;
 
-/// Parameters of a viewer.
 pub struct Setup {
     pub device: Arc<Device>,
     /// Options with which background bakes open their own device.
@@ -54,7 +53,6 @@ pub struct Setup {
     pub preview_after: Duration,
 }
 
-/// What a preview shows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Previewed {
     Nothing,
@@ -67,7 +65,6 @@ pub enum Previewed {
 /// Time for which a message is shown.
 const SHOWN: Duration = Duration::from_secs(6);
 
-/// A line for the user.
 pub(super) struct Message {
     since: Instant,
     text: String,
@@ -173,12 +170,10 @@ impl Viewer {
         Ok(viewer)
     }
 
-    /// The state that is shown.
     pub fn editor(&self) -> &Editor {
         &self.editor
     }
 
-    /// As [`Editor::rescued`].
     pub fn rescued(&mut self, error: Error) -> Error {
         // The saved picture has the size of the window.
         self.editor.apply(Command::Resize(self.size));
@@ -195,12 +190,10 @@ impl Viewer {
         self.frame.as_ref()
     }
 
-    /// egui's context, for its input and output.
     pub fn egui(&self) -> &egui::Context {
         &self.egui
     }
 
-    /// Whether the user asked to close the window.
     pub fn wants_to_quit(&self) -> bool {
         self.quit
     }
@@ -240,7 +233,6 @@ impl Viewer {
         self.shader_error.as_deref()
     }
 
-    /// Frames drawn so far.
     pub fn frame_count(&self) -> u64 {
         self.frame_count
     }
@@ -250,7 +242,6 @@ impl Viewer {
         self.build_count
     }
 
-    /// Whether a frame would show something new.
     pub fn wants_frame(&self) -> bool {
         let moves = self.editor.running && self.editor.scene().data.entities.iter().any(|e| !e.motion.is_empty());
         let is_due = |at: Option<Instant>| at.is_some_and(|at| at <= Instant::now());
@@ -448,7 +439,6 @@ impl Viewer {
         }
     }
 
-    /// The last message to the user.
     pub fn message(&self) -> Option<&str> {
         self.messages.back().map(|message| message.text.as_str())
     }

@@ -8,7 +8,6 @@
 pub mod camera;
 mod choices;
 pub mod grid;
-pub mod patches;
 pub mod pixel_light;
 pub mod show;
 pub mod smooth;
@@ -277,12 +276,6 @@ impl Draw {
         let grid = || if grids { self.grid.make() } else { Ok(()) };
         let (triangles, grid) = rayon::join(|| self.triangles.make(surfaces), grid);
         triangles.and(grid)
-    }
-
-    /// Makes the pipelines that another of the same scene has drawn with, so that shaders that fail do so now.
-    pub fn make_those_of(&self, other: &Draw) -> Result<()> {
-        self.triangles.make_those_of(&other.triangles)?;
-        self.grid.make_those_of(&other.grid)
     }
 
     /// Device memory of a pixel in the images of [`Draw::new`], bytes, as [`Draw::size_bytes`] counts it.

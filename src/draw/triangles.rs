@@ -197,7 +197,7 @@ enum Form {
 }
 
 impl Form {
-    const ALL: [Form; 4] = [Form::Vertices, Form::OverDepth, Form::Over, Form::Pixels];
+    const COUNT: usize = 4;
 }
 
 fn culled(entity: &DrawnEntity<'_>) -> vk::CullModeFlags {
@@ -209,7 +209,7 @@ pub struct DrawTriangles {
     /// How the sharp lights are evaluated that glossy surfaces have highlights of.
     highlights: Option<SharpPermutation>,
     /// By look and form; each is made where it is first drawn with.
-    made: [[OnceLock<GraphicsPipeline>; Form::ALL.len()]; Look::COUNT],
+    made: [[OnceLock<GraphicsPipeline>; Form::COUNT]; Look::COUNT],
 }
 
 impl DrawTriangles {
@@ -228,20 +228,6 @@ impl DrawTriangles {
             let look = self.look_of(surface.painted, surface.detail);
             forms.par_iter().try_for_each(|form| self.pipeline(look, *form).map(|_| ()))
         })
-    }
-
-    pub fn make_those_of(&self, other: &DrawTriangles) -> Result<()> {
-        let highlights = self.highlights.as_ref();
-        let glossy =
-            [Detail::Rough, Detail::Mirror, Detail::Textured].map(|detail| Look::Glossy { highlights, detail });
-        for look in [Look::Plain, Look::Painted].into_iter().chain(glossy) {
-            for form in Form::ALL {
-                if other.made[look.number()][form as usize].get().is_some() {
-                    self.pipeline(look, form)?;
-                }
-            }
-        }
-        Ok(())
     }
 
     fn pipeline(&self, look: Look<'_>, form: Form) -> Result<&GraphicsPipeline> {

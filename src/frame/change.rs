@@ -87,8 +87,10 @@ impl Frame {
         ];
         if drawing.into_iter().any(uses) {
             self.refine(false)?;
-            let drawer = self.drawer(&self.options, self.picture.draw.finish())?;
-            drawer.draw.make_those_of(&self.picture.draw)?;
+            let mut drawer = self.drawer(&self.options, self.picture.draw.finish())?;
+            // Shaders that fail do so now.
+            self.make_pipelines_of(&drawer.draw)?;
+            drawer.draw.is_made = true;
             self.exchange(drawer);
             self.picture.other = None;
         }

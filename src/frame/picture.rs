@@ -67,9 +67,13 @@ fn readback(device: &Arc<Device>, [width, height]: [u32; 2]) -> Result<Buffer> {
 impl Frame {
     /// Makes the pipelines of all that pictures of light show, before the first one.
     pub(super) fn make_pipelines(&mut self) -> Result<()> {
-        if std::mem::replace(&mut self.picture.draw.is_made, true) {
-            return Ok(());
+        if !std::mem::replace(&mut self.picture.draw.is_made, true) {
+            self.make_pipelines_of(&self.picture.draw)?;
         }
+        Ok(())
+    }
+
+    pub(super) fn make_pipelines_of(&self, draw: &Draw) -> Result<()> {
         let is_grid = |entity: &usize| self.buffers.surface(*entity).drawn.grid().is_some();
         let (grids, triangles): (Vec<usize>, Vec<usize>) = (0..self.scene.entities.len()).partition(is_grid);
         let surface = |index: usize| DrawnSurface {
@@ -78,7 +82,7 @@ impl Frame {
             transparent: self.scene.entities[index].transparent,
         };
         let surfaces: HashSet<DrawnSurface> = triangles.into_iter().map(surface).collect();
-        self.picture.draw.make(surfaces, !grids.is_empty())
+        draw.make(surfaces, !grids.is_empty())
     }
 
     /// Input of [`super::record()`] for the picture that was prepared last; `white` as in [`Frame::render`].

@@ -18,7 +18,6 @@ mod pose;
 mod prepare;
 mod radiosity;
 mod record;
-mod room;
 mod sky;
 mod twin;
 mod viewport;
@@ -51,12 +50,12 @@ use sky::SkyLight;
 use std::ops::Range;
 use std::sync::Arc;
 
+pub use memory::PictureMemory;
 #[cfg(feature = "cli")]
 pub use options::picture_size;
 pub use options::{Options, RenderOptions};
 pub use prepare::Relight;
 pub use record::{MergeWork, PictureTarget, PictureWork, record};
-pub use room::PictureMemory;
 pub use viewport::{RadiositySource, Viewport};
 
 /// How the light of each entity of a scene is computed.

@@ -1,8 +1,8 @@
 //! Pictures of a frame: prepared, drawn into images of one size, read back.
 
+use super::memory::READBACK_PIXEL_BYTES;
 use super::permutation::pixel_shading;
 use super::record::PictureWork;
-use super::room::READBACK_PIXEL_BYTES;
 use super::viewport::Viewport;
 use super::{Frame, Options, gloss};
 use crate::asset::edges::Edges;

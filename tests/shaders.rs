@@ -99,26 +99,24 @@ fn drawing() -> Vec<ShaderPermutation> {
         rolled: outlines,
     });
     let ways = [None, Some(&sharp[0]), Some(&sharp[1])];
-    let grids = [false, true].into_iter().flat_map(|display| ways.map(|sharp| DrawGrid::row(display, sharp)));
+    let grids = ways.map(DrawGrid::row);
     let glossy = ways.into_iter().flat_map(|highlights| {
         [Detail::Rough, Detail::Mirror, Detail::Textured].map(|detail| Look::Glossy { highlights, detail })
     });
     let looks: Vec<Look<'_>> = [Look::Plain, Look::Painted].into_iter().chain(glossy).collect();
-    let triangles = [false, true]
+    let triangles = looks.iter().flat_map(|&look| {
+        // Alone, and of four samples a pixel.
+        let of = |samples: u32| {
+            let patches = sharp.iter().flat_map(|sharp| DrawTriangles::patch_rows(samples, look, sharp));
+            let over = [false, true].map(|over| DrawTriangles::rows(samples, look, over));
+            over.into_iter().flatten().chain(patches).collect::<Vec<_>>()
+        };
+        [of(1), of(4)].concat()
+    });
+    grids
         .into_iter()
-        .flat_map(|display| looks.iter().map(move |look| (display, *look)))
-        .flat_map(|(display, look)| {
-            // Alone, and of four samples a pixel.
-            let of = |samples: u32| {
-                let patches = sharp.iter().flat_map(|sharp| DrawTriangles::patch_rows(display, samples, look, sharp));
-                let over = [false, true].map(|over| DrawTriangles::rows(display, samples, look, over));
-                over.into_iter().flatten().chain(patches).collect::<Vec<_>>()
-            };
-            [of(1), of(4)].concat()
-        });
-    let fragments = grids.chain(triangles);
-    fragments
-        .chain([false, true].map(Smooth::fragment))
+        .chain(triangles)
+        .chain([Smooth::fragment()])
         .chain(
             ["grid.vert", "overlay.vert", "overlay.frag", "show.vert", "show.frag", "smooth.vert"]
                 .map(|file| ShaderPermutation::new(file, 4)),

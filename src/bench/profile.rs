@@ -3,7 +3,7 @@
 use super::Bench;
 use super::ceilings::Ceilings;
 use super::figures::{Spread, spread};
-use crate::draw::{Antialias, Finish};
+use crate::draw::Antialias;
 use crate::error::Result;
 use crate::frame::{self, Frame};
 use crate::gpu::census::Census;
@@ -190,7 +190,7 @@ pub fn frame_times(
     frames: u32,
 ) -> Result<BTreeMap<String, Vec<f64>>> {
     const WARM_UP: u32 = 2;
-    frame.set_finish(Finish::Display, antialias)?;
+    frame.set_antialias(antialias)?;
     let mut times: BTreeMap<String, Vec<f64>> = BTreeMap::new();
     for index in 0..WARM_UP + frames {
         let placements = scene.at(f64::from(index) / 30.0);

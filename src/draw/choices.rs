@@ -3,16 +3,6 @@
 use crate::gpu::Device;
 use ash::vk;
 
-/// Purpose of a picture: its format and tone follow from it.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Finish {
-    /// Linear radiance in half floats, for files and further work.
-    #[default]
-    Linear,
-    /// 8 bits, sRGB, with white at its brightest, for a screen. Samples are averaged after encoding.
-    Display,
-}
-
 /// How the edges of what is drawn are kept from showing as stairs.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[cfg_attr(feature = "cli", derive(clap::ValueEnum))]

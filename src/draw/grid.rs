@@ -167,9 +167,9 @@ impl DrawGrid {
     }
 
     fn pipeline(&self, sharp: Option<&SharpPermutation>) -> Result<&GraphicsPipeline> {
-        let PipelineMaker { state, display, .. } = self.maker;
+        let state = self.maker.state;
         let vertex = ShaderPermutation::new("grid.vert", 4);
-        let fragment = Self::row(display, sharp);
+        let fragment = Self::row(sharp);
         made_once(&self.made[usize::from(sharp.is_some())], || match sharp {
             None => self.maker.make("draw grid", &[vertex, fragment], state),
             Some(_) => {
@@ -182,8 +182,8 @@ impl DrawGrid {
         })
     }
 
-    pub fn row(display: bool, sharp: Option<&SharpPermutation>) -> ShaderPermutation {
-        let row = ShaderPermutation::new("grid.frag", 4).define("DISPLAY", display).define("PIXEL", sharp.is_some());
+    pub fn row(sharp: Option<&SharpPermutation>) -> ShaderPermutation {
+        let row = ShaderPermutation::new("grid.frag", 4).define("PIXEL", sharp.is_some());
         sharp.map_or(row.clone(), |sharp| sharp.pixel_row(row, false))
     }
 

@@ -1,7 +1,7 @@
 //! Pass "draw": lit vertices to a picture.
 //!
 //! Inputs: for each entity its mesh (positions in metres from the centre of its bounding sphere, emission pattern,
-//! indices) and its range of the radiosity buffer. Output: RGBA of `width` x `height`, linear or encoded for a screen.
+//! indices) and its range of the radiosity buffer. Output: RGBA of `width` x `height`, linear.
 //! With one sample a pixel, alpha holds the tag of the entity that is seen, and the depth image is kept. With more
 //! samples they are averaged.
 
@@ -15,7 +15,6 @@ pub mod triangles;
 
 use crate::asset::grid::Grid;
 use crate::asset::mesh::Mesh;
-use crate::asset::picture::srgb_from_linear;
 use crate::draw::grid::{DrawGrid, DrawnGrid};
 use crate::draw::pixel_light::{ByPixel, PixelLight};
 use crate::draw::smooth::Smooth;
@@ -30,7 +29,7 @@ use crate::shaders::{Library, ShaderPermutation};
 use crate::sharp::SharpPermutation;
 use ash::vk;
 use bytemuck::{Pod, Zeroable};
-pub use choices::{Antialias, Finish, Shading};
+pub use choices::{Antialias, Shading};
 use glam::{Mat4, Vec3};
 use std::collections::HashSet;
 use std::ops::Range;
@@ -38,9 +37,6 @@ use std::sync::{Arc, OnceLock};
 
 /// Linear half floats. Their 11 bits are more than a PNG shows, and they take half the bandwidth of f32.
 const COLOR: vk::Format = vk::Format::R16G16B16A16_SFLOAT;
-/// Format for a screen: the shader encodes sRGB, and it takes half the bytes of half floats. With a format that encodes
-/// by itself (_SRGB), llvmpipe takes 1.5 times as long at four samples a pixel.
-const SHOWN: vk::Format = vk::Format::R8G8B8A8_UNORM;
 const DEPTH: vk::Format = vk::Format::D32_SFLOAT;
 
 pub enum DrawnMesh {
@@ -192,8 +188,6 @@ pub struct PipelineMaker {
     device: Arc<Device>,
     library: Library,
     state: GraphicsState,
-    /// Whether the picture is encoded.
-    display: bool,
     /// Where pixels evaluate sharp lights: how.
     sharp: Option<SharpPermutation>,
 }
@@ -244,16 +238,12 @@ impl Draw {
         library: &Library,
         [width, height]: [u32; 2],
         antialias: Antialias,
-        finish: Finish,
         lights: PictureLights,
     ) -> Result<Self> {
         let samples = antialias.samples(device);
-        let color = if finish == Finish::Display { SHOWN } else { COLOR };
-        let shape = ImageShape { format: color, width, height, samples: 1 };
-        let state = GraphicsState { depth: Some(DEPTH), samples, ..GraphicsState::plain(color) };
-        let display = finish == Finish::Display;
-        let maker =
-            PipelineMaker { device: device.clone(), library: library.clone(), state, display, sharp: lights.pixels };
+        let shape = ImageShape { format: COLOR, width, height, samples: 1 };
+        let state = GraphicsState { depth: Some(DEPTH), samples, ..GraphicsState::plain(COLOR) };
+        let maker = PipelineMaker { device: device.clone(), library: library.clone(), state, sharp: lights.pixels };
         Ok(Draw {
             triangles: DrawTriangles::new(maker.clone(), lights.highlights),
             grid: DrawGrid::new(maker),
@@ -264,9 +254,7 @@ impl Draw {
             picture: Image::new(device, "picture", shape)?,
             batch_triangles: if device.info.is_software() { 1 << 18 } else { u32::MAX / 3 },
             is_made: false,
-            smooth: (antialias == Antialias::Outlines)
-                .then(|| Smooth::new(device, library, shape, display))
-                .transpose()?,
+            smooth: (antialias == Antialias::Outlines).then(|| Smooth::new(device, library, shape)).transpose()?,
         })
     }
 
@@ -279,15 +267,10 @@ impl Draw {
     }
 
     /// Device memory of a pixel in the images of [`Draw::new`], bytes, as [`Draw::size_bytes`] counts it.
-    pub fn pixel_bytes(device: &Device, antialias: Antialias, finish: Finish) -> u64 {
+    pub fn pixel_bytes(device: &Device, antialias: Antialias) -> u64 {
         let samples = u64::from(antialias.samples(device));
-        let color = if finish == Finish::Linear { 8 } else { 4 };
         let colors = 1 + u64::from(antialias == Antialias::Outlines) + if samples > 1 { samples } else { 0 };
-        colors * color + samples * 4
-    }
-
-    pub fn finish(&self) -> Finish {
-        if self.picture.shape.format == SHOWN { Finish::Display } else { Finish::Linear }
+        colors * 8 + samples * 4
     }
 
     pub fn samples(&self) -> u32 {
@@ -305,7 +288,7 @@ impl Draw {
         colors.chain([(&self.depth, Access::DepthWrite)])
     }
 
-    /// Device memory of the images, bytes: 8 a sample of linear colour, 4 of encoded colour and of depth.
+    /// Device memory of the images, bytes: 8 a sample of colour, 4 of depth.
     pub fn size_bytes(&self) -> u64 {
         let texels = |image: &Image| {
             let shape = image.shape;
@@ -328,10 +311,6 @@ impl Draw {
         // Its hue is kept, as that of surfaces is.
         let brightest = background.max_element();
         let background = if brightest > white { background * (white / brightest) } else { background };
-        let background = match self.finish() {
-            Finish::Linear => background,
-            Finish::Display => Vec3::from_array((background / white).to_array().map(srgb_from_linear)),
-        };
         let target = Target {
             color: self.samples.as_ref().unwrap_or(&self.picture),
             clear: Some(background.extend(1.0).to_array()),

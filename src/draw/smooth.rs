@@ -122,18 +122,15 @@ pub struct Smooth {
 }
 
 impl Smooth {
-    pub fn fragment(display: bool) -> ShaderPermutation {
-        ShaderPermutation::new("smooth.frag", 4)
-            .define("DISPLAY", display)
-            .number("TOLERANCE", TOLERANCE)
-            .number("SNAPPED", SNAPPED)
+    pub fn fragment() -> ShaderPermutation {
+        ShaderPermutation::new("smooth.frag", 4).number("TOLERANCE", TOLERANCE).number("SNAPPED", SNAPPED)
     }
 
-    /// For pictures of a shape. `display` says that they are encoded for a screen.
-    pub fn new(device: &Arc<Device>, library: &Library, shape: ImageShape, display: bool) -> Result<Self> {
+    /// For pictures of a shape.
+    pub fn new(device: &Arc<Device>, library: &Library, shape: ImageShape) -> Result<Self> {
         let state = GraphicsState::plain(shape.format);
         let vertex = library.shader(&ShaderPermutation::new("smooth.vert", 4))?;
-        let fragment = library.shader(&Self::fragment(display))?;
+        let fragment = library.shader(&Self::fragment())?;
         Ok(Smooth {
             pipeline: GraphicsPipeline::new(device, "smooth", &vertex, &fragment, state)?,
             picture: Image::new(device, "smooth picture", shape)?,

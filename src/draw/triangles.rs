@@ -231,7 +231,7 @@ impl DrawTriangles {
     }
 
     fn pipeline(&self, look: Look<'_>, form: Form) -> Result<&GraphicsPipeline> {
-        let PipelineMaker { state, display, sharp, .. } = &self.maker;
+        let PipelineMaker { state, sharp, .. } = &self.maker;
         made_once(&self.made[look.number()][form as usize], || {
             let keeps = match form {
                 Form::Vertices => state.keeps,
@@ -239,12 +239,12 @@ impl DrawTriangles {
                 Form::Over => Keeps::ColorOver,
                 Form::Pixels => {
                     let sharp = sharp.as_ref().expect("pixels evaluate lights where a scene has sharp ones");
-                    let rows = Self::patch_rows(*display, state.samples, look, sharp);
+                    let rows = Self::patch_rows(state.samples, look, sharp);
                     let nearer = GraphicsState { nearer_steps: NEARER_STEPS, ..*state };
                     return self.maker.make("draw triangle pixels", &rows, nearer);
                 }
             };
-            let rows = Self::rows(*display, state.samples, look, form != Form::Vertices);
+            let rows = Self::rows(state.samples, look, form != Form::Vertices);
             self.maker.make("draw", &rows, GraphicsState { keeps, ..*state })
         })
     }
@@ -280,9 +280,9 @@ impl DrawTriangles {
 
     /// The rows of the shaders that show the light of vertices: vertex and fragment. With `over` what they draw lies over
     /// what is behind it.
-    pub fn rows(display: bool, samples: u32, look: Look<'_>, over: bool) -> [ShaderPermutation; 2] {
+    pub fn rows(samples: u32, look: Look<'_>, over: bool) -> [ShaderPermutation; 2] {
         let row = |file| look.macros(ShaderPermutation::new(file, 4), GLOSS_BINDINGS[0]);
-        let fragment = row("draw.frag").define("DISPLAY", display).define("OVER", over).define("SAMPLES", samples);
+        let fragment = row("draw.frag").define("OVER", over).define("SAMPLES", samples);
         let fragment = match look {
             Look::Glossy { highlights: Some(sharp), .. } => sharp.pixel_row(fragment, false),
             _ => fragment,
@@ -291,14 +291,11 @@ impl DrawTriangles {
     }
 
     /// The rows of the shaders whose pixels evaluate lights: vertex and fragment.
-    pub fn patch_rows(display: bool, samples: u32, look: Look<'_>, sharp: &SharpPermutation) -> [ShaderPermutation; 2] {
+    pub fn patch_rows(samples: u32, look: Look<'_>, sharp: &SharpPermutation) -> [ShaderPermutation; 2] {
         let row = |file| look.macros(ShaderPermutation::new(file, 4), GLOSS_BINDINGS[1]);
         [
             row("triangle.vert").number("LEAST_PX", LEAST_PX),
-            sharp.pixel_row(
-                row("triangle.frag").define("DISPLAY", display).define("SAMPLES", samples),
-                sharp.self_shadows,
-            ),
+            sharp.pixel_row(row("triangle.frag").define("SAMPLES", samples), sharp.self_shadows),
         ]
     }
 

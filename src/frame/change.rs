@@ -87,7 +87,7 @@ impl Frame {
         ];
         if drawing.into_iter().any(uses) {
             self.refine(false)?;
-            let mut drawer = self.drawer(&self.options, self.picture.draw.finish())?;
+            let mut drawer = self.drawer(&self.options)?;
             // Shaders that fail do so now.
             self.make_pipelines_of(&drawer.draw)?;
             drawer.draw.is_made = true;

@@ -4,7 +4,7 @@
 use super::pixel::PixelChains;
 use super::{Frame, Options};
 use crate::bounce::Bounce;
-use crate::draw::{Draw, Finish};
+use crate::draw::Draw;
 use crate::error::{Error, Result};
 use crate::gloss::Reflections;
 use crate::gpu::Device;
@@ -91,7 +91,7 @@ impl PictureMemory {
     /// For pictures that a frame with these options makes for files.
     pub fn new(device: &Device, options: &Options) -> Self {
         let pixels = u64::from(options.size[0]) * u64::from(options.size[1]);
-        let pixel_bytes = Draw::pixel_bytes(device, options.antialias, Finish::Linear) + READBACK_PIXEL_BYTES;
+        let pixel_bytes = Draw::pixel_bytes(device, options.antialias) + READBACK_PIXEL_BYTES;
         PictureMemory {
             size: options.size,
             device: pixels * pixel_bytes,

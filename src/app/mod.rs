@@ -25,11 +25,10 @@ use crate::error::{Error, Result, one_line};
 #[cfg(all(unix, feature = "view"))]
 use crate::gpu::display;
 use crate::gpu::process;
-use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
+use clap::{Parser, Subcommand};
 pub use context::Global;
 use std::ffi::OsString;
 use std::process::ExitCode;
-use std::sync::{LazyLock, Mutex, PoisonError};
 
 /// Precomputed shadow fields: shadows of many moving objects under many moving lights, on Vulkan.
 ///
@@ -77,16 +76,6 @@ enum Subcommands {
 /// Runs the program on arguments, the first of which is its name, as the command line does.
 pub fn run_on<A: Into<OsString> + Clone>(arguments: impl IntoIterator<Item = A>) -> Result<()> {
     run(&parse(arguments)?).and_then(|()| output::written())
-}
-
-/// Whether the command line understands arguments, the first of which is the program's name. Nothing is run. The parser
-/// is made once and kept, because making it takes longer than using it.
-pub fn understand<A: Into<OsString> + Clone>(arguments: impl IntoIterator<Item = A>) -> Result<()> {
-    static COMMAND: LazyLock<Mutex<clap::Command>> = LazyLock::new(|| Mutex::new(Cli::command()));
-    let usage = |error: clap::Error| Error::Usage(error.to_string());
-    let mut command = COMMAND.lock().unwrap_or_else(PoisonError::into_inner);
-    let matches = command.try_get_matches_from_mut(arguments).map_err(usage)?;
-    Cli::from_arg_matches(&matches).map(|_| ()).map_err(usage)
 }
 
 fn parse<A: Into<OsString> + Clone>(arguments: impl IntoIterator<Item = A>) -> Result<Cli> {

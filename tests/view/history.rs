@@ -8,28 +8,6 @@ use shadow_fields::view::input::CONTROLS;
 use std::path::Path;
 
 #[test]
-fn a_slide_is_one_step_of_undo_and_two_are_two() {
-    let mut editor = from_text(SMALL);
-    let start = editor.scene().data.clone();
-    for ev in 1..9 {
-        editor.apply(Command::SetLight(ev as f32));
-    }
-    editor.apply(Command::EndSlide);
-    let first = editor.scene().data.clone();
-    editor.apply(Command::SetLight(10.0));
-    assert_eq!(editor.undo_count(), 2);
-    editor.apply(Command::Undo);
-    assert_eq!(editor.scene().data, first);
-    editor.apply(Command::Undo);
-    assert_eq!(editor.scene().data, start);
-    editor.apply(Command::Redo);
-    assert_eq!(editor.scene().data, first);
-    // A new change forgets what was taken back.
-    editor.apply(Command::SetExposure(2.0));
-    assert!(editor.apply(Command::Redo).message.is_some());
-}
-
-#[test]
 fn history_is_bounded() {
     let mut editor = from_text(SMALL);
     editor.apply(Command::SelectNext);

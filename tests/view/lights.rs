@@ -72,4 +72,8 @@ fn sliders_change_the_scene_and_undo_as_one() {
     }
     assert_eq!(editor.scene().data, before);
     assert!(editor.apply(Command::Undo).message.is_some());
+    // A new change forgets what was taken back.
+    assert!(editor.apply(Command::Redo).changed.emission);
+    editor.apply(Command::SetExposure(2.0));
+    assert!(editor.apply(Command::Redo).message.is_some());
 }

@@ -90,11 +90,6 @@ impl Stand {
         self.place(title).height() < 50.0
     }
 
-    /// Share of the window that the panels cover.
-    fn covered(&self) -> f32 {
-        [KEYS, FIGURES].map(|title| self.place(title).area()).iter().sum::<f32>() / self.screen.area()
-    }
-
     /// Sizes of all texts that are seen, points.
     fn texts(&mut self) -> Vec<(f32, String)> {
         let shapes = self.turn(Vec::new());
@@ -132,15 +127,6 @@ fn no_text_is_smaller_than_twelve_points() {
         assert!(sizes.iter().any(|(_, text)| text.contains(part)), "{part:?} is not shown: {sizes:?}");
     }
     assert!(sizes.iter().all(|(size, _)| *size >= 12.0), "{sizes:?}");
-}
-
-#[test]
-fn panels_cover_at_most_a_fifth_of_a_window() {
-    for (size, folded) in [([1280.0, 720.0], false), ([960.0, 640.0], false), ([640.0, 360.0], true)] {
-        let stand = Stand::new(size);
-        assert!(stand.covered() < 0.2, "{size:?}: {}", stand.covered());
-        assert_eq!(stand.is_folded(FIGURES), folded, "{size:?}");
-    }
 }
 
 #[test]
@@ -192,19 +178,5 @@ fn panels_grow_back_after_the_window_was_small() {
         stand.resize(small);
         stand.resize([1280.0, 720.0]);
         assert_eq!(state(&mut stand), before, "{small:?}");
-    }
-}
-
-#[test]
-fn a_folded_panel_leaves_nothing_beside_it() {
-    let mut stand = Stand::new([1280.0, 720.0]);
-    let title = stand.place(FIGURES);
-    stand.click(title.left_top() + egui::vec2(20.0, 16.0));
-    let [keys, figures] = [KEYS, FIGURES].map(|title| stand.place(title).expand(2.0));
-    assert!(keys.height() < 50.0 && figures.height() < 50.0);
-    for clipped in stand.turn(Vec::new()) {
-        let drawn = clipped.shape.visual_bounding_rect().intersect(clipped.clip_rect);
-        let is_above = drawn.is_positive() && drawn.bottom() < 100.0;
-        assert!(!is_above || keys.contains_rect(drawn) || figures.contains_rect(drawn), "{drawn} beside {figures}");
     }
 }

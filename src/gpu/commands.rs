@@ -270,7 +270,7 @@ impl<'r> Commands<'r> {
 
     /// Ends the recording, submits it and waits. Returns the duration of each pass, in order.
     pub fn submit(self) -> Result<Vec<Timing>> {
-        self.end()?.run(Signals::default())?.wait()
+        self.end()?.run()?.wait()
     }
 
     /// Ends the recording and submits it without waiting. The recording must begin with [`Commands::after_flights`],

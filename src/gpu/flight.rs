@@ -115,8 +115,8 @@ impl Recording {
     }
 
     /// Submits; the caller must wait before it releases anything that the recording uses.
-    pub fn run(mut self, signals: Signals) -> Result<Flight> {
-        self.start(&signals)?;
+    pub fn run(mut self) -> Result<Flight> {
+        self.start(&Signals::default())?;
         Ok(Flight { recording: self, launched: false })
     }
 

@@ -75,17 +75,8 @@ impl Frame {
     pub fn reload(&mut self, changed: &[String]) -> Result<()> {
         let library = self.library.clone();
         let uses = |entry: &str| library.files(entry).iter().any(|file| changed.contains(file));
-        let drawing = [
-            "draw.vert",
-            "draw.frag",
-            "grid.vert",
-            "grid.frag",
-            "triangle.vert",
-            "triangle.frag",
-            "smooth.vert",
-            "smooth.frag",
-        ];
-        if drawing.into_iter().any(uses) {
+        let draws = |part: &str| uses(&format!("{part}.vert")) || uses(&format!("{part}.frag"));
+        if ["draw", "grid", "triangle", "smooth"].into_iter().any(draws) {
             self.refine(false)?;
             let mut drawer = self.drawer(&self.options)?;
             // Shaders that fail do so now.

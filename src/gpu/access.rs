@@ -173,8 +173,8 @@ impl Tracker {
         }
         if access.writes() {
             uses.retain(|earlier| earlier.range.start < range.start || range.end < earlier.range.end);
-        } else if uses.iter().any(|u| u.access == access && u.range == range && u.pass == pass) {
-            // The same pass repeats the same use: a later writer has to wait for the last one only.
+        } else {
+            // Where the same pass repeats the same use: a later writer waits for the last one only.
             uses.retain(|u| !(u.access == access && u.range == range && u.pass == pass));
         }
         uses.push(Use { order: self.order, range, access, pass: pass.to_owned() });

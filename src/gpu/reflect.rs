@@ -3,8 +3,7 @@
 
 use crate::error::{Error, Result};
 use ash::vk;
-use rspirv::binary::{Consumer, ParseAction, ParseState, parse_words};
-use rspirv::dr::{Instruction, Loader, Module, ModuleHeader, Operand};
+use rspirv::dr::{Instruction, Module, Operand, load_words};
 use rspirv::spirv::{BuiltIn, Decoration, Dim, ExecutionMode, Op, StorageClass};
 use std::collections::{BTreeMap, HashMap};
 
@@ -51,36 +50,24 @@ pub struct Reflection {
 
 impl Reflection {
     pub fn new(spirv: &[u32]) -> Result<Self> {
-        let mut declarations = Declarations(Loader::new());
-        match parse_words(spirv, &mut declarations) {
-            Ok(()) | Err(ParseState::ConsumerStopRequested) => Reader::new(&declarations.0.module()).reflect(),
-            Err(error) => Err(Error::Failed(format!("unreadable SPIR-V: {error}"))),
-        }
+        let module = load_words(declarations(spirv))
+            .map_err(|error| Error::Failed(format!("unreadable SPIR-V: {error}")))?;
+        Reader::new(&module).reflect()
     }
 }
 
-/// Loads what stands before the first function, where all declarations are; functions are most of a module.
-struct Declarations(Loader);
-
-impl Consumer for Declarations {
-    fn initialize(&mut self) -> ParseAction {
-        self.0.initialize()
-    }
-
-    fn finalize(&mut self) -> ParseAction {
-        self.0.finalize()
-    }
-
-    fn consume_header(&mut self, header: ModuleHeader) -> ParseAction {
-        self.0.consume_header(header)
-    }
-
-    fn consume_instruction(&mut self, instruction: Instruction) -> ParseAction {
-        match instruction.class.opcode {
-            Op::Function => ParseAction::Stop,
-            _ => self.0.consume_instruction(instruction),
+/// What stands before the first function, where all declarations are; functions are most of a module.
+fn declarations(spirv: &[u32]) -> &[u32] {
+    const HEADER_WORDS: usize = 5;
+    let mut at = HEADER_WORDS;
+    while let Some(word) = spirv.get(at) {
+        let [word_count, opcode] = [word >> 16, word & 0xffff];
+        if opcode == Op::Function as u32 || word_count == 0 {
+            return &spirv[..at];
         }
+        at += word_count as usize;
     }
+    spirv
 }
 
 /// A module with indexes by id, for the queries below.

@@ -118,35 +118,34 @@ pub(super) fn physical_devices(instance: &ash::Instance) -> Result<Vec<(vk::Phys
 }
 
 pub(super) fn describe(instance: &ash::Instance, index: usize, physical: vk::PhysicalDevice) -> Candidate {
-    // SAFETY: for the whole block, queries on live handles with structs that outlive the calls; the 1.3 structs are
-    // only chained if the device supports 1.3.
-    let (properties, unsuitable, counts_samples, identity, driver) = unsafe {
+    let mut identity = vk::PhysicalDeviceIDProperties::default();
+    let mut driver = vk::PhysicalDeviceDriverProperties::default();
+    let mut both = vk::PhysicalDeviceProperties2::default().push_next(&mut identity).push_next(&mut driver);
+    let mut core_1_3 = vk::PhysicalDeviceVulkan13Features::default();
+    let mut features = vk::PhysicalDeviceFeatures2::default().push_next(&mut core_1_3);
+    // SAFETY: for the whole block, queries on live handles with structs that outlive the calls; structs are only chained
+    // if the device supports their version.
+    let (properties, families) = unsafe {
         let properties = instance.get_physical_device_properties(physical);
-        let mut identity = vk::PhysicalDeviceIDProperties::default();
-        let mut driver = vk::PhysicalDeviceDriverProperties::default();
-        let mut both = vk::PhysicalDeviceProperties2::default().push_next(&mut identity).push_next(&mut driver);
         if properties.api_version >= vk::API_VERSION_1_2 {
             instance.get_physical_device_properties2(physical, &mut both);
         }
-        let mut unsuitable = None;
-        let mut counts_samples = false;
-        if properties.api_version < vk::API_VERSION_1_3 {
-            unsuitable = Some(format!("supports Vulkan {}, but 1.3 is needed", version_text(properties.api_version)));
-        } else {
-            let mut core_1_3 = vk::PhysicalDeviceVulkan13Features::default();
-            let mut features = vk::PhysicalDeviceFeatures2::default().push_next(&mut core_1_3);
+        if properties.api_version >= vk::API_VERSION_1_3 {
             instance.get_physical_device_features2(physical, &mut features);
-            counts_samples = features.features.occlusion_query_precise == vk::TRUE;
-            let families = instance.get_physical_device_queue_family_properties(physical);
-            let missing =
-                [(core_1_3.dynamic_rendering, "dynamicRendering"), (core_1_3.synchronization2, "synchronization2")];
-            if let Some((_, feature)) = missing.iter().find(|(present, _)| *present == vk::FALSE) {
-                unsuitable = Some(format!("lacks the feature {feature}"));
-            } else if queue_family(&families).is_none() {
-                unsuitable = Some("has no queue with graphics, compute and timestamps".into());
-            }
         }
-        (properties, unsuitable, counts_samples, identity, driver)
+        (properties, instance.get_physical_device_queue_family_properties(physical))
+    };
+    let counts_samples = features.features.occlusion_query_precise == vk::TRUE;
+    let unsuitable = if properties.api_version < vk::API_VERSION_1_3 {
+        Some(format!("supports Vulkan {}, but 1.3 is needed", version_text(properties.api_version)))
+    } else if core_1_3.dynamic_rendering == vk::FALSE {
+        Some("lacks the feature dynamicRendering".into())
+    } else if core_1_3.synchronization2 == vk::FALSE {
+        Some("lacks the feature synchronization2".into())
+    } else if queue_family(&families).is_none() {
+        Some("has no queue with graphics, compute and timestamps".into())
+    } else {
+        None
     };
     let text = |chars: &[std::ffi::c_char]| {
         let bytes: Vec<u8> = chars.iter().map(|&c| c.cast_unsigned()).collect();

@@ -108,6 +108,13 @@ pub struct Effect {
     pub message: Option<String>,
 }
 
+impl Effect {
+    /// Nothing changed, and a line says why.
+    pub(super) fn said(message: impl Into<String>) -> Self {
+        Effect { message: Some(message.into()), ..Effect::default() }
+    }
+}
+
 impl From<Changed> for Effect {
     fn from(changed: Changed) -> Self {
         Effect { changed, ..Effect::default() }

@@ -100,7 +100,7 @@ impl Editor {
 
     fn toggle_light(&mut self) -> Effect {
         let Some(index) = self.selection else {
-            return Effect { message: Some("select an entity first: click it, or Q / A".into()), ..Effect::default() };
+            return Effect::said("select an entity first: click it, or Q / A");
         };
         self.note_entities(EditKind::Role, false, &[index]);
         let mut data = self.scene.data.entities[index].clone();
@@ -173,7 +173,7 @@ impl Editor {
             return Effect::default();
         }
         if let Err(error) = self.scene.set_environment(&after) {
-            return Effect { message: Some(error.to_string()), ..Effect::default() };
+            return Effect::said(error.to_string());
         }
         let before = Snapshot { environment: Some(before), ..Snapshot::default() };
         self.history.note(kind, None, true, || before);

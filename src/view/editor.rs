@@ -158,7 +158,13 @@ impl Editor {
             Command::SelectNext => self.cycle(1),
             Command::SelectPrevious => self.cycle(-1),
             Command::SelectNone => self.select(None),
-            Command::Pick(_) | Command::DragStart(_) | Command::DragTo(_) | Command::DragEnd => self.point(command),
+            Command::Pick(at) => {
+                let seen = self.hit(at).map(|(entity, _)| entity);
+                self.select(seen)
+            }
+            Command::DragStart(at) => self.grab(at),
+            Command::DragTo(at) => self.drag_to(at),
+            Command::DragEnd => self.let_go(),
             Command::NextScene => self.next_scene(),
             Command::ToggleRunning => toggle(&mut self.running),
             Command::ToggleReference => toggle(&mut self.reference),

@@ -144,7 +144,7 @@ fn graph(ui: &mut Ui, timings: &VecDeque<Vec<Timing>>) {
         if free.contains(y) {
             painter.hline(area.x_range(), y, Stroke::new(1.0, Color32::from_white_alpha(70)));
             label(pos2(area.left(), y), Align2::LEFT_CENTER, text.to_owned());
-            free.min = y + 1.5 * LEAST_TEXT;
+            free.min = y + 1.25 * LEAST_TEXT;
         }
     }
     ui.horizontal_wrapped(|ui| {

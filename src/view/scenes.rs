@@ -72,7 +72,7 @@ impl Editor {
     pub(super) fn next_scene(&mut self) -> Effect {
         match self.load_next() {
             Ok((scene, path)) => self.open(scene, &path),
-            Err(error) => Effect { message: Some(error.to_string()), ..Effect::default() },
+            Err(error) => Effect::said(error.to_string()),
         }
     }
 
@@ -102,11 +102,6 @@ impl Editor {
             return self.folder().join(format!("{stem}.toml"));
         }
         self.numbered(&self.folder(), |path| self.saved.contains(path) || !path.exists())
-    }
-
-    /// Path of a file in `folder` that does not exist yet, named as [`Editor::save_path`] does.
-    pub(super) fn unused_path(&self, folder: &Path) -> PathBuf {
-        self.numbered(folder, |path| !path.exists())
     }
 
     /// The folder of [`Editor::save_path`].
@@ -167,11 +162,11 @@ impl Editor {
             None => Vec::new(),
         };
         if self.is_edited() {
-            let first = self.unused_path(&self.folder());
+            let first = self.numbered(&self.folder(), |path| !path.exists());
             let path = match self.save(&first) {
                 Ok(()) => first,
                 Err(error) => {
-                    let second = self.unused_path(&std::env::temp_dir());
+                    let second = self.numbered(&std::env::temp_dir(), |path| !path.exists());
                     self.save(&second).map_err(|_| error)?;
                     second
                 }

@@ -128,11 +128,6 @@ impl DrawnGrid {
     pub fn fits(device: &Device, cells: usize, vertices: usize) -> bool {
         TexelView::fits(device, QUADS, 16 * cells as u64) && TexelView::fits(device, QUAD_FORMAT, 16 * vertices as u64)
     }
-
-    pub fn size_bytes(&self) -> u64 {
-        let own = [&self.positions, &self.places, &self.indices, &self.corners];
-        own.into_iter().chain(&self.patches).map(|buffer| buffer.size_bytes).sum()
-    }
 }
 
 #[repr(C)]

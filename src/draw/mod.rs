@@ -88,13 +88,6 @@ impl DrawnMesh {
     pub fn grid(&self) -> Option<&DrawnGrid> {
         if let DrawnMesh::Grid(grid, _) = self { Some(grid) } else { None }
     }
-
-    pub fn size_bytes(&self) -> u64 {
-        match self {
-            DrawnMesh::Triangles(triangles) => triangles.size_bytes(),
-            DrawnMesh::Grid(grid, _) => grid.size_bytes(),
-        }
-    }
 }
 
 pub struct DrawnEntity<'d> {
@@ -266,7 +259,7 @@ impl Draw {
         triangles.and(grid)
     }
 
-    /// Device memory of a pixel in the images of [`Draw::new`], bytes, as [`Draw::size_bytes`] counts it.
+    /// Device memory of a pixel in the images of [`Draw::new`], bytes.
     pub fn pixel_bytes(device: &Device, antialias: Antialias) -> u64 {
         let samples = u64::from(antialias.samples(device));
         let colors = 1 + u64::from(antialias == Antialias::Outlines) + if samples > 1 { samples } else { 0 };
@@ -286,17 +279,6 @@ impl Draw {
     pub fn attachments(&self) -> impl Iterator<Item = (&Image, Access)> {
         let colors = self.samples.iter().chain([&self.picture]).map(|image| (image, Access::ColorWrite));
         colors.chain([(&self.depth, Access::DepthWrite)])
-    }
-
-    /// Device memory of the images, bytes: 8 a sample of colour, 4 of depth.
-    pub fn size_bytes(&self) -> u64 {
-        let texels = |image: &Image| {
-            let shape = image.shape;
-            let texel_bytes = if shape.format == COLOR { 8 } else { 4 };
-            texel_bytes * u64::from(shape.width) * u64::from(shape.height) * u64::from(shape.samples)
-        };
-        let attachments = self.attachments().map(|(image, _)| image);
-        attachments.chain(self.smooth.iter().map(|smooth| &smooth.picture)).map(texels).sum()
     }
 
     /// Draws all viewports, one after the other, over a background of one colour. Radiance above `white` is brought

@@ -110,10 +110,6 @@ impl Lines {
         self.marks.write(&strips.marks)?;
         self.indices.write(&indices)
     }
-
-    pub fn size_bytes(&self) -> u64 {
-        self.corners.all_bytes() + self.marks.all_bytes() + self.indices.all_bytes()
-    }
 }
 
 pub struct Smooth {

@@ -77,11 +77,6 @@ impl DrawnTriangles {
         })
     }
 
-    pub fn size_bytes(&self) -> u64 {
-        let paint = self.paint.as_ref().map_or(0, |paint| paint.size_bytes);
-        self.positions.size_bytes + self.emission.size_bytes + self.indices.size_bytes + paint
-    }
-
     /// Whether a device's texel views hold the mesh, and the vertices and the self-visibility of all meshes, so that
     /// its pixels can evaluate lights.
     pub fn fits_views(&self, device: &Device, vertices: &Buffer, self_cells: &Buffer) -> bool {

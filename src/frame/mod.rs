@@ -9,7 +9,7 @@
 mod change;
 mod draw_twin;
 mod gloss;
-pub mod memory;
+mod memory;
 mod options;
 mod permutation;
 mod picture;

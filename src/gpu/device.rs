@@ -57,6 +57,7 @@ pub struct Device {
     pub info: Candidate,
     pub cache_dir: Option<PathBuf>,
     pub(super) next_resource: AtomicU64,
+    pub(super) allocated_bytes: AtomicU64,
     omitted_barrier: AtomicUsize,
     /// Last: the instance outlives the device.
     pub(super) instance: Arc<Instance>,
@@ -154,6 +155,7 @@ impl Device {
             info,
             cache_dir,
             next_resource: AtomicU64::new(1),
+            allocated_bytes: AtomicU64::new(0),
             omitted_barrier: AtomicUsize::new(usize::MAX),
             instance: instance.clone(),
         };
@@ -164,6 +166,11 @@ impl Device {
     /// Whether a caller made the device, uses its queue too and destroys it.
     pub fn is_shared(&self) -> bool {
         self.is_shared
+    }
+
+    /// Memory of all buffers and images that exist now, bytes.
+    pub fn allocated_bytes(&self) -> u64 {
+        self.allocated_bytes.load(Ordering::Relaxed)
     }
 
     /// Size of the largest device-local heap in bytes.

@@ -37,7 +37,7 @@ impl BufferKind {
 pub(super) struct Allocation {
     device: Arc<Device>,
     pub(super) handle: vk::DeviceMemory,
-    pub(super) size_bytes: u64,
+    size_bytes: u64,
     host_coherent: bool,
 }
 
@@ -67,6 +67,7 @@ impl Allocation {
         // SAFETY: size and type come from the device; freed in `Drop`.
         let handle = unsafe { device.handle.allocate_memory(&allocate, None) }.checked("vkAllocateMemory", name)?;
         device.name(handle, name);
+        device.allocated_bytes.fetch_add(needs.size, Ordering::Relaxed);
         let coherent = vk::MemoryPropertyFlags::HOST_VISIBLE | vk::MemoryPropertyFlags::HOST_COHERENT;
         let host_coherent = types[index].property_flags.contains(coherent);
         Ok(Allocation { device: device.clone(), handle, size_bytes: needs.size, host_coherent })
@@ -77,6 +78,7 @@ impl Drop for Allocation {
     fn drop(&mut self) {
         // SAFETY: the object bound to this memory is dropped first (field order of its owner).
         unsafe { self.device.handle.free_memory(self.handle, None) };
+        self.device.allocated_bytes.fetch_sub(self.size_bytes, Ordering::Relaxed);
     }
 }
 
@@ -271,10 +273,6 @@ impl Upload {
         }
         buffer.write(0, data);
         Ok(())
-    }
-
-    pub fn all_bytes(&self) -> u64 {
-        self.buffers.iter().map(|buffer| buffer.size_bytes).sum()
     }
 }
 

@@ -34,8 +34,6 @@ impl Drop for Sampler {
 pub struct Texture {
     sampler: Sampler,
     image: Image,
-    /// Device memory, bytes.
-    pub size_bytes: u64,
 }
 
 impl Texture {
@@ -61,7 +59,7 @@ impl Texture {
         // SAFETY: destroyed by `Sampler`.
         let sampler = unsafe { device.handle.create_sampler(&sampler, None) }.checked("vkCreateSampler", name)?;
         let sampler = Sampler(device.clone(), sampler);
-        let texture = Texture { sampler, size_bytes: image.memory_bytes(), image };
+        let texture = Texture { sampler, image };
         texture.fill(device, name, levels)?;
         Ok(texture)
     }

@@ -377,14 +377,4 @@ mod tests {
         assert_eq!(extent(&own(0, 0), [640, 480]), None);
         assert_eq!(extent(&own(640, 480), [0, 0]), None, "minimised");
     }
-
-    #[test]
-    fn srgb_before_plain_before_none() {
-        let of = |format| vk::SurfaceFormatKHR { format, color_space: vk::ColorSpaceKHR::SRGB_NONLINEAR };
-        let plain = of(vk::Format::B8G8R8A8_UNORM);
-        let srgb = of(vk::Format::B8G8R8A8_SRGB);
-        assert_eq!(best_format(&[plain, srgb]).unwrap().format, srgb.format);
-        assert_eq!(best_format(&[plain]).unwrap().format, plain.format);
-        assert_eq!(best_format(&[of(vk::Format::R5G6B5_UNORM_PACK16)]).unwrap_err().exit_code(), 3);
-    }
 }

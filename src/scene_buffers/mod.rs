@@ -232,11 +232,6 @@ impl SceneBuffers {
         blocked.as_ref().is_some_and(|slot| slot.extent != Extent::Nothing)
     }
 
-    pub fn texture_bytes(&self) -> u64 {
-        let is_first = |i: &usize| !self.textures[..*i].iter().any(|other| Arc::ptr_eq(other, &self.textures[*i]));
-        (0..self.textures.len()).filter(is_first).map(|i| self.textures[i].size_bytes).sum()
-    }
-
     pub fn surface(&self, entity: usize) -> &DeviceSurface {
         &self.surfaces[self.surface_of[entity]]
     }

@@ -8,7 +8,7 @@ use shadow_fields::asset::texture::{Texels, Texture, Wrap};
 use shadow_fields::asset::{Generator, Mesh};
 use shadow_fields::bake::Baker;
 use shadow_fields::draw::Antialias;
-use shadow_fields::frame::{self, PictureMemory};
+use shadow_fields::frame;
 use shadow_fields::scene::data::{Camera, EntityData};
 use shadow_fields::scene::{Albedo, Placement, Scene};
 use shadow_fields::shaders::Library;
@@ -403,15 +403,4 @@ fn textures_are_even_under_four_samples() {
         }
     }
     assert!(compared > 1000, "{compared} pixels");
-}
-
-#[test]
-fn what_is_said_of_memory_is_what_is_taken() {
-    let Some(stage) = stage() else { return };
-    for antialias in [Antialias::None, Antialias::Outlines, Antialias::Samples] {
-        let options = options(antialias);
-        let said = PictureMemory::new(&stage.gpu.device, &options);
-        let frame = stage.frame(&balls("", &[[1.0; 3]]), options);
-        assert_eq!(said.device, frame.memory().pictures, "{antialias:?}");
-    }
 }

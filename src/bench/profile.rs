@@ -84,7 +84,7 @@ impl ProfileRow {
             _ => 16,
         };
         let fetched: u32 = census.fetches.iter().map(|(name, count)| count * bytes_of(name)).sum();
-        let loaded: u32 = census.block_bytes.values().sum();
+        let loaded = census.block_bytes;
         let work = Work { flops: census.flops, fetches: census.fetch_count(), bytes: fetched + loaded };
         let quads = census.fetches.get("field_quads").copied().unwrap_or(0);
         // Per pair: one a nanosecond is 10^9 a second.

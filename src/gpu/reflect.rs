@@ -50,8 +50,8 @@ pub struct Reflection {
 
 impl Reflection {
     pub fn new(spirv: &[u32]) -> Result<Self> {
-        let module = load_words(declarations(spirv))
-            .map_err(|error| Error::Failed(format!("unreadable SPIR-V: {error}")))?;
+        let module =
+            load_words(declarations(spirv)).map_err(|error| Error::Failed(format!("unreadable SPIR-V: {error}")))?;
         Reader::new(&module).reflect()
     }
 }

@@ -254,7 +254,8 @@ impl SceneBuffers {
 
     /// A copy of one field in host memory, for the CPU twin.
     pub fn field(&self, slot: &FieldSlot) -> Result<ShadowField> {
-        field_atlas::download(&self.fields, slot)
+        let payload = self.fields.download_range(slot.bytes.clone())?;
+        Ok(ShadowField { header: slot.header.clone(), payload })
     }
 
     /// A copy of a surface's transfer vectors, in the mesh's order of vertices, and the floats of each.

@@ -50,10 +50,7 @@ impl Viewer {
         // move.
         let known = self.reference.as_ref().map(|r| r.version);
         let stale = self.rays_version != self.version && known == Some(self.rays_version);
-        if (self.rays.is_none() && !current)
-            || stale
-            || (!current && !self.rays.as_ref().is_some_and(BackgroundTask::is_running))
-        {
+        if stale || (!current && !self.rays.as_ref().is_some_and(BackgroundTask::is_running)) {
             let scene = self.editor.scene().clone();
             let placements = self.editor.placements();
             self.rays = Some(cast(scene, placements, self.version, self.setup.seed));
@@ -68,15 +65,9 @@ impl Viewer {
     /// Computes the error's colours for the last merge, unless they are known.
     pub(super) fn compare(&mut self) -> Result<()> {
         let (Some(frame), Some(reference)) = (&mut self.frame, &self.reference) else { return Ok(()) };
-        if frame.stale_count() > 0 {
-            // Some clusters are out of date; the next frame merges them.
-            return Ok(());
-        }
-        if self
-            .error_shown
-            .as_ref()
-            .is_some_and(|(version, rays, _)| (*version, *rays) == (self.version, reference.rays))
-        {
+        let known = self.error_shown.map(|(version, rays, _)| (version, rays));
+        // Where some clusters are out of date, the next frame merges them.
+        if frame.stale_count() > 0 || known == Some((self.version, reference.rays)) {
             return Ok(());
         }
         let map = ErrorMap::new(&error_map::radiosity(frame)?, &reference.radiosity);

@@ -31,7 +31,6 @@ use glam::DVec3;
 pub use silhouettes::{SilhouetteSlot, Silhouettes};
 use std::ops::Range;
 use std::sync::Arc;
-use textures::Content;
 
 /// A mesh of the scene as it shades and shines: its fields.
 pub struct DeviceMesh {
@@ -205,8 +204,7 @@ impl SceneBuffers {
             surfaces,
             textures: textures::upload(device, &scene.textures, |index| {
                 let is_number = |maps: MapIndices| maps.gloss == Some(index) || maps.normal == Some(index);
-                let any = scene.entities.iter().any(|entity| is_number(entity.maps));
-                if any { Content::Numbers } else { Content::Colors }
+                scene.entities.iter().any(|entity| is_number(entity.maps))
             })?,
             surface_of: baked.surface_of,
             baked: baked.baked,

@@ -233,10 +233,6 @@ impl Viewer {
         self.shader_error.as_deref()
     }
 
-    pub fn frame_count(&self) -> u64 {
-        self.frame_count
-    }
-
     /// Scenes prepared for drawing so far, the same one anew where lights became occluders.
     pub fn build_count(&self) -> u64 {
         self.build_count

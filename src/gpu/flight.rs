@@ -192,9 +192,9 @@ impl Flight {
     pub fn wait(mut self) -> Result<Vec<Timing>> {
         let recording = &mut self.recording;
         recording.wait()?;
+        let flags = vk::QueryResultFlags::TYPE_64 | vk::QueryResultFlags::WAIT;
         let mut stamps = vec![0_u64; 2 * recording.passes.len()];
         if !stamps.is_empty() {
-            let flags = vk::QueryResultFlags::TYPE_64 | vk::QueryResultFlags::WAIT;
             // SAFETY: the pool is alive and has two stamps a pass.
             unsafe { recording.device.handle.get_query_pool_results(recording.queries, 0, &mut stamps, flags) }
                 .checked("vkGetQueryPoolResults", &recording.name)?;
@@ -210,7 +210,6 @@ impl Flight {
             .collect();
         for &pass in &recording.counted {
             let mut count = [0_u64];
-            let flags = vk::QueryResultFlags::TYPE_64 | vk::QueryResultFlags::WAIT;
             // SAFETY: the pool is alive, and the query was begun and ended in the recording.
             unsafe { recording.device.handle.get_query_pool_results(recording.samples, pass, &mut count, flags) }
                 .checked("vkGetQueryPoolResults", &recording.name)?;

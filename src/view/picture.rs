@@ -54,8 +54,7 @@ impl Viewer {
         };
         let target = match (&canvas, &shot) {
             (FrameTarget::Image(image), _) => *image,
-            (_, Some(shot)) => &*shot.image,
-            (FrameTarget::Window(_), None) => unreachable!("a window gave a shot"),
+            (FrameTarget::Window(_), shot) => &*shot.as_ref().expect("a window gave a shot").image,
         };
         let size = [target.shape.width, target.shape.height];
         let viewports = self.viewports(size);

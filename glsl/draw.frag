@@ -21,17 +21,6 @@ const uint NONE = 0xffffffffu;
 #include "gloss_pixel.glsl"
 #endif
 
-#if OVER
-// A premultiplied colour over what is behind it, of which `opacity` is kept back.
-vec4 over(vec3 shown, float opacity) {
-#if DISPLAY
-    // Encoded colours are blended: with this alpha what is behind loses as much light.
-    opacity = 1.0 - pow(1.0 - opacity, 1.0 / 2.2);
-#endif
-    return vec4(shown, opacity);
-}
-#endif
-
 layout(push_constant) uniform Push {
     mat4 clip_from_object;
     vec4 emission_white; // w = radiance that is shown as white
@@ -63,7 +52,7 @@ void main() {
     shown = glow(push.entity, within * shown, push.emission_white.rgb, uv);
     shown += glossy(push.entity, base, over_mean * within * light, uv, within);
 #if OVER
-    color = over(finish(shown, push.emission_white.w), opacity);
+    color = vec4(finish(shown, push.emission_white.w), opacity);
 #else
     color = vec4(finish(shown, push.emission_white.w), push.tag);
 #endif
@@ -75,8 +64,8 @@ void main() {
 #if !OVER
     color = vec4(finish(within * shown, push.emission_white.w), push.tag);
 #elif PAINTED
-    color = over(finish(within * shown, push.emission_white.w), opacity);
+    color = vec4(finish(within * shown, push.emission_white.w), opacity);
 #else
-    color = over(finish(within * shown, push.emission_white.w), push.tag);
+    color = vec4(finish(within * shown, push.emission_white.w), push.tag);
 #endif
 }

@@ -1,6 +1,5 @@
 #version 460
 #extension GL_EXT_samplerless_texture_functions : require
-#include "srgb.glsl"
 // Smooths a pixel whose centre lies within half a pixel of a line, along x or y: the colour of the pixel on the line's
 // other side is blended in by the share of the pixel that the line cuts off.
 layout(binding = 0) uniform texture2D picture; // alpha: tag of the entity seen
@@ -55,10 +54,5 @@ void main() {
         discard; // something hides the line
     }
     float share = 0.5 - abs(offset);
-#if DISPLAY
-    vec3 mixed = mix(linear_from_srgb(own.rgb), linear_from_srgb(beyond.rgb), share);
-    color = vec4(srgb_from_linear(mixed), 1.0);
-#else
     color = vec4(mix(own.rgb, beyond.rgb, share), 1.0);
-#endif
 }

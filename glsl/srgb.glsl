@@ -7,8 +7,3 @@ vec3 srgb_from_linear(vec3 linear) {
     vec3 curve = -0.0401096 + s * (1.5179504 + s * (-1.4027355 + s * (2.0315754 + s * (-1.6236616 + s * 0.5173047))));
     return mix(curve, 12.92 * linear, lessThanEqual(linear, vec3(0.0031308)));
 }
-
-vec3 linear_from_srgb(vec3 encoded) {
-    vec3 curve = pow((encoded + 0.055) / 1.055, vec3(2.4));
-    return mix(curve, encoded / 12.92, lessThanEqual(encoded, vec3(0.04045)));
-}

@@ -80,7 +80,7 @@
 //! | [`check`] | every pass against its CPU twin |
 //! | `bench` | measurements of time and error (feature `cli`) |
 //! | [`farm`] | bakes and pictures of many machines: plans, results, engines (`docs/farm.md` says how they are used) |
-//! | `view` | the state behind the window (feature `cli`) |
+//! | `view` | the state behind the window (feature `view`) |
 //! | `app` | the command line, a file for each subcommand (feature `cli`) |
 
 pub mod error;
@@ -135,7 +135,7 @@ pub mod sharp;
 pub mod text;
 #[doc(hidden)]
 pub mod truth;
-#[cfg(feature = "cli")]
+#[cfg(feature = "view")]
 #[doc(hidden)]
 pub mod view;
 

@@ -5,7 +5,7 @@ use crate::error::{Error, Result};
 use crate::field::quantity::channel_stride;
 use crate::field::self_visibility;
 use crate::files;
-use crate::gpu::shader::ShaderSource;
+use crate::gpu::shader::{ShaderSource, gather};
 use crate::gpu::{Shader, Stage};
 use crate::layout::{self, shared_macros};
 use crate::sh;
@@ -178,18 +178,10 @@ impl Library {
 
     /// An entry point's file and every file that it includes, directly or indirectly, without generated includes.
     pub fn files(&self, entry: &str) -> Vec<String> {
-        let mut files = vec![entry.to_owned()];
-        let mut at = 0;
-        while at < files.len() {
-            let text = self.text(&files[at]).unwrap_or_default();
-            for name in crate::gpu::shader::included(&text) {
-                if !name.starts_with("generated/") && !files.iter().any(|known| known == name) {
-                    files.push(name.to_owned());
-                }
-            }
-            at += 1;
-        }
-        files
+        let text = |name: &str| Some(self.text(name).unwrap_or_default());
+        let included = gather(entry, &text(entry).unwrap_or_default(), &text).unwrap_or_default();
+        let names = included.into_keys().filter(|name| !name.starts_with("generated/"));
+        names.chain([entry.to_owned()]).collect()
     }
 
     fn text(&self, name: &str) -> Result<String> {

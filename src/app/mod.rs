@@ -24,12 +24,11 @@ mod view;
 use crate::error::{Error, Result, one_line};
 #[cfg(all(unix, feature = "view"))]
 use crate::gpu::display;
-use crate::gpu::signals;
-use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
+use crate::gpu::process;
+use clap::{Parser, Subcommand};
 pub use context::Global;
 use std::ffi::OsString;
 use std::process::ExitCode;
-use std::sync::{LazyLock, Mutex, PoisonError};
 
 /// Precomputed shadow fields: shadows of many moving objects under many moving lights, on Vulkan.
 ///
@@ -79,23 +78,13 @@ pub fn run_on<A: Into<OsString> + Clone>(arguments: impl IntoIterator<Item = A>)
     run(&parse(arguments)?).and_then(|()| output::written())
 }
 
-/// Whether the command line understands arguments, the first of which is the program's name. Nothing is run. The parser
-/// is made once and kept, because making it takes longer than using it.
-pub fn understand<A: Into<OsString> + Clone>(arguments: impl IntoIterator<Item = A>) -> Result<()> {
-    static COMMAND: LazyLock<Mutex<clap::Command>> = LazyLock::new(|| Mutex::new(Cli::command()));
-    let usage = |error: clap::Error| Error::Usage(error.to_string());
-    let mut command = COMMAND.lock().unwrap_or_else(PoisonError::into_inner);
-    let matches = command.try_get_matches_from_mut(arguments).map_err(usage)?;
-    Cli::from_arg_matches(&matches).map(|_| ()).map_err(usage)
-}
-
 fn parse<A: Into<OsString> + Clone>(arguments: impl IntoIterator<Item = A>) -> Result<Cli> {
     Cli::try_parse_from(arguments).map_err(|error| Error::Usage(error.to_string()))
 }
 
 /// Runs the program on the process's arguments and returns its exit code.
 pub fn main() -> ExitCode {
-    signals::fail_writes_beyond_limit();
+    process::fail_writes_beyond_limit();
     let cli = Cli::try_parse().unwrap_or_else(|error| refuse(error));
     output::start_log(&cli.global);
     match run(&cli).and_then(|()| output::written()) {
@@ -105,7 +94,7 @@ pub fn main() -> ExitCode {
             // The device of a window whose display is lost still works: exit handlers would unload what it runs.
             #[cfg(all(unix, feature = "view"))]
             if display::is_lost() {
-                signals::end_at_once(error.exit_code());
+                process::end_at_once(error.exit_code());
             }
             ExitCode::from(error.exit_code())
         }

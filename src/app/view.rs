@@ -6,7 +6,7 @@ use super::{Global, output};
 use crate::draw::Antialias;
 use crate::error::{Error, Result};
 use crate::frame::{self, RenderOptions};
-use crate::gpu::{self, Device, PresentMode, Window, display, heap};
+use crate::gpu::{self, Device, PresentMode, Window, display, process};
 use crate::scene::Scene;
 use crate::view::command::Command;
 use crate::view::editor::add_sky;
@@ -28,8 +28,6 @@ use winit::window::WindowId;
 
 /// Pixels of a touchpad's wheel that count as a notch.
 const NOTCH_PX: f64 = 40.0;
-/// Time in which the events of a drop come.
-const DROP_PATIENCE: Duration = Duration::from_millis(200);
 /// How often a window that shows nothing is asked again.
 const HIDDEN_PERIOD: Duration = Duration::from_millis(200);
 /// Smallest window in which the overlay can be read.
@@ -62,7 +60,7 @@ pub struct Arguments {
 
 /// Opens the window and stays until it is closed.
 pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
-    heap::share_arena();
+    process::share_arena();
     let mut scene = arguments.gltf.scene(global, &arguments.scene, 0.0)?;
     if arguments.look.environment.is_none() {
         add_sky(&mut scene);
@@ -74,7 +72,6 @@ pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
     let owned = events.owned_display_handle();
     let handle = owned.display_handle().map_err(no_display)?.as_raw();
     let proxy = events.create_proxy();
-    display::notice_drops(handle);
     // A loop that has ended need not be woken.
     let _watch = display::outlive(handle, move || proxy.send_event(()).unwrap_or_default());
     let mut device_options = gpu::DeviceOptions::default();
@@ -185,8 +182,6 @@ struct Shown {
     pointer: [f32; 2],
     updated: Instant,
     opened: Instant,
-    /// When a drop of files that does not come counts as failed.
-    drop_end: Option<Instant>,
     /// Nothing could be drawn the last time.
     hidden: bool,
     /// When it was tried.
@@ -255,7 +250,6 @@ impl App<'_> {
             pointer: [0.0; 2],
             updated: Instant::now(),
             opened: Instant::now(),
-            drop_end: None,
             hidden: false,
             tried: Instant::now(),
         })
@@ -293,7 +287,6 @@ impl ApplicationHandler for App<'_> {
         let now = Instant::now();
         let passed = now.duration_since(std::mem::replace(&mut shown.updated, now));
         let outcome = shown.viewer.update(passed.as_secs_f64());
-        shown.look_for_drops(now);
         let flow = if shown.hidden {
             if shown.tried.elapsed() >= HIDDEN_PERIOD {
                 shown.window.request_redraw();
@@ -303,8 +296,7 @@ impl ApplicationHandler for App<'_> {
             shown.window.request_redraw();
             ControlFlow::Wait
         } else {
-            let idle = shown.viewer.idle().map(|idle| now + idle);
-            idle.into_iter().chain(shown.drop_end).min().map_or(ControlFlow::Wait, ControlFlow::WaitUntil)
+            shown.viewer.idle().map_or(ControlFlow::Wait, |idle| ControlFlow::WaitUntil(now + idle))
         };
         events.set_control_flow(flow);
         self.check(events, outcome);
@@ -312,16 +304,6 @@ impl ApplicationHandler for App<'_> {
 }
 
 impl Shown {
-    /// Says of files that were dropped that they do not exist: no event follows such a drop.
-    fn look_for_drops(&mut self, now: Instant) {
-        if display::take_drop() {
-            self.drop_end = Some(now + DROP_PATIENCE);
-        }
-        if self.drop_end.take_if(|end| *end <= now).is_some() {
-            self.viewer.insist("not opened: what was dropped is no file that exists here".to_owned());
-        }
-    }
-
     /// egui's input, as `take_egui_input` gives it. That panics where another program has just destroyed the window.
     fn input(&mut self) -> egui::RawInput {
         let scale = egui_winit::pixels_per_point(self.viewer.egui(), &self.window);
@@ -345,11 +327,7 @@ impl Shown {
         }
         match event {
             WindowEvent::CloseRequested => self.viewer.apply(Command::Quit),
-            WindowEvent::DroppedFile(path) => {
-                self.drop_end = None;
-                display::take_drop();
-                self.viewer.open(path)
-            }
+            WindowEvent::DroppedFile(path) => self.viewer.open(path),
             WindowEvent::Destroyed => Err(Error::Device("another program destroyed the window".into())),
             WindowEvent::Resized(size) => {
                 log::info!("resized to {}x{}", size.width, size.height);

@@ -138,7 +138,7 @@ fn clipped([from, to]: [DVec4; 2]) -> Option<[DVec4; 2]> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::asset::generate::cuboid;
+    use crate::asset::generate::{cuboid, plane};
     use glam::Vec3;
 
     /// Clip space of a camera at the origin that looks along -z and sees 90 degrees.
@@ -164,5 +164,14 @@ mod tests {
             let turn = (q - p).truncate().perp_dot((middle - p).truncate());
             assert!(turn * line.side > 0.0, "{line:?}");
         }
+    }
+
+    /// A floor that is wider than the picture and reaches behind the eye shows its far edge alone, as far as that is seen.
+    #[test]
+    fn lines_end_at_the_edges_of_the_picture() {
+        let place = DVec3::new(0.0, -1.0, 10.0);
+        let lines = Edges::new(&plane(60.0, 1)).lines(CLIP * DMat4::from_translation(place), -place, false);
+        assert_eq!(lines.len(), 1, "{lines:?}");
+        assert!(lines[0].ends.iter().all(|c| (c.w - 20.0).abs() < 1e-3 && (c.x.abs() / c.w - 1.0).abs() < 1e-6));
     }
 }

@@ -3,7 +3,7 @@
 use super::Bench;
 use super::ceilings::Ceilings;
 use super::figures::{Spread, spread};
-use crate::draw::{Antialias, Finish};
+use crate::draw::Antialias;
 use crate::error::Result;
 use crate::frame::{self, Frame};
 use crate::gpu::census::Census;
@@ -84,7 +84,7 @@ impl ProfileRow {
             _ => 16,
         };
         let fetched: u32 = census.fetches.iter().map(|(name, count)| count * bytes_of(name)).sum();
-        let loaded: u32 = census.block_bytes.values().sum();
+        let loaded = census.block_bytes;
         let work = Work { flops: census.flops, fetches: census.fetch_count(), bytes: fetched + loaded };
         let quads = census.fetches.get("field_quads").copied().unwrap_or(0);
         // Per pair: one a nanosecond is 10^9 a second.
@@ -190,7 +190,7 @@ pub fn frame_times(
     frames: u32,
 ) -> Result<BTreeMap<String, Vec<f64>>> {
     const WARM_UP: u32 = 2;
-    frame.set_finish(Finish::Display, antialias)?;
+    frame.set_antialias(antialias)?;
     let mut times: BTreeMap<String, Vec<f64>> = BTreeMap::new();
     for index in 0..WARM_UP + frames {
         let placements = scene.at(f64::from(index) / 30.0);

@@ -6,7 +6,6 @@ use super::sweep::merge_ms;
 use super::town::{Town, moved};
 use super::{Bench, default_options};
 use crate::error::{Error, Result};
-use crate::frame::memory::Memory;
 use crate::frame::{self, Frame};
 use crate::lists::gather::Counts;
 use crate::lists::skip::Skip;
@@ -45,8 +44,6 @@ pub struct ScalingPoint {
     pub counts: Counts,
     /// Relative root mean square error of a sample of vertices against ray casting.
     pub error: f64,
-    /// Device memory and lists, bytes.
-    pub memory_bytes: Memory,
     pub device_bytes: u64,
     /// Resident memory of the process in bytes, if the system reports it. On a software device it includes device
     /// memory.
@@ -162,8 +159,7 @@ fn point(bench: &Bench<'_>, axis: &'static str, town: Town) -> Result<ScalingPoi
         entries_a_vertex,
         counts: frame.counts(&placements),
         error: error(bench, &mut frame, &placements)?,
-        memory_bytes: frame.memory(),
-        device_bytes: frame.memory().device(),
+        device_bytes: bench.baker.device().allocated_bytes(),
         resident_bytes,
     })
 }

@@ -241,7 +241,7 @@ impl Judge {
             merge_ms: spread(&merges[i]),
             entries: entries[i],
             error: difference(&found[i], &self.truth, self.unit),
-            field_bytes: frames[i].memory().fields,
+            field_bytes: frames[i].buffers.fields.size_bytes,
         };
         let off = side(0);
         let on = side(1);

@@ -294,12 +294,6 @@ impl Bounce {
         self.movers.as_ref().map(Movers::permutation)
     }
 
-    pub fn size_bytes(&self) -> u64 {
-        let all = [&self.runs, &self.areas, &self.ranges, &self.links, &self.run_light];
-        let movers = self.movers.as_ref().map_or(0, Movers::size_bytes);
-        all.iter().map(|buffer| buffer.size_bytes).sum::<u64>() + movers
-    }
-
     /// Adds bounces, one a step, to the direct light of all vertices, which was written before.
     pub fn record<'r>(&'r self, commands: &mut Commands<'r>, work: &BounceWork<'r>) -> Result<()> {
         let BounceWork { entities, light, steps, .. } = work;

@@ -193,12 +193,6 @@ impl Movers {
         self.entries.write(&entries)
     }
 
-    pub fn size_bytes(&self) -> u64 {
-        let all = [&self.far_data, &self.runs, &self.light, &self.incoming];
-        all.iter().map(|buffer| buffer.size_bytes).sum::<u64>()
-            + [&self.movers_data, &self.clusters, &self.entries].iter().map(|upload| upload.all_bytes()).sum::<u64>()
-    }
-
     /// Which variant its inputs are to be read by.
     pub fn permutation(&self) -> &MergePermutation {
         &self.permutation

@@ -4,9 +4,13 @@
 //! The cells of a floor are small on the screen, so that light on them is smooth. A software rasteriser takes far
 //! longer for many small triangles than for a large one of the same area. The picture is that of the triangles, except
 //! for rounding.
+//!
+//! Blocks of cells, the patches, are drawn again where their pixels evaluate sharp lights themselves. A software
+//! rasteriser runs a fragment shader's branches for all pixels of a block of its own, taken or not. So pixels that
+//! evaluate lights are not told from the others in the fragment shader: patches are drawn over the grid by a shader of
+//! their own, whose vertex shader throws away those that no shadow's edge comes near.
 
 use crate::asset::grid::Grid;
-use crate::draw::patches::{BLOCK_CELLS, Patches};
 use crate::draw::pixel_light::{PixelLight, texels};
 use crate::draw::{DrawnEntity, DrawnViewport, EntityPush, PipelineMaker, made_once};
 use crate::error::Result;
@@ -24,6 +28,49 @@ const QUADS: vk::Format = vk::Format::R32G32B32A32_UINT;
 /// How much nearer patches are drawn than the grid that they lie on, in steps of depth: 2e-6 of the distance. Rounding
 /// of two triangles in one plane differs by less.
 const NEARER_STEPS: f32 = 32.0;
+
+/// Cells along an edge of a block.
+const BLOCK_CELLS: u32 = 4;
+
+/// How far a block reaches over its cells on every side, in cells: corners that lie on a neighbour's edge leave cracks.
+const OVERLAP: f32 = 1.0 / 16.0;
+
+/// The blocks of a grid, row by row, as they are drawn.
+#[derive(Default)]
+struct Patches {
+    /// Four corners a block in the object's frame, metres.
+    positions: Vec<[f32; 3]>,
+    /// The same in cells from the first.
+    places: Vec<[f32; 2]>,
+    /// Two triangles a block.
+    indices: Vec<[u32; 3]>,
+}
+
+impl Patches {
+    /// All blocks of a grid whose first corner is `corner`.
+    fn new(grid: &Grid, corner: Vec3) -> Self {
+        let mut patches = Patches::default();
+        let [columns, rows] = grid.cells;
+        let steps = [grid.sides[0] / columns as f32, grid.sides[1] / rows as f32];
+        for (y, x) in
+            (0..rows.div_ceil(BLOCK_CELLS)).flat_map(|y| (0..columns.div_ceil(BLOCK_CELLS)).map(move |x| (y, x)))
+        {
+            let reach = |block: u32, cells: u32| {
+                let first = (block * BLOCK_CELLS) as f32;
+                [(first - OVERLAP).max(0.0), (first + BLOCK_CELLS as f32 + OVERLAP).min(cells as f32)]
+            };
+            let across = reach(x, columns);
+            let down = reach(y, rows);
+            let first = patches.positions.len() as u32;
+            for place in [[across[0], down[0]], [across[1], down[0]], [across[0], down[1]], [across[1], down[1]]] {
+                patches.positions.push((corner + steps[0] * place[0] + steps[1] * place[1]).to_array());
+                patches.places.push(place);
+            }
+            patches.indices.extend([[0, 1, 2], [2, 1, 3]].map(|triangle| triangle.map(|v| v + first)));
+        }
+        patches
+    }
+}
 
 pub struct DrawnGrid {
     positions: Buffer,
@@ -81,12 +128,6 @@ impl DrawnGrid {
     pub fn fits(device: &Device, cells: usize, vertices: usize) -> bool {
         TexelView::fits(device, QUADS, 16 * cells as u64) && TexelView::fits(device, QUAD_FORMAT, 16 * vertices as u64)
     }
-
-    /// Device memory, bytes.
-    pub fn size_bytes(&self) -> u64 {
-        let own = [&self.positions, &self.places, &self.indices, &self.corners];
-        own.into_iter().chain(&self.patches).map(|buffer| buffer.size_bytes).sum()
-    }
 }
 
 #[repr(C)]
@@ -120,19 +161,10 @@ impl DrawGrid {
         plain.and(pixels)
     }
 
-    pub fn make_those_of(&self, other: &DrawGrid) -> Result<()> {
-        for (made, sharp) in other.made.iter().zip([None, self.maker.sharp.as_ref()]) {
-            if made.get().is_some() {
-                self.pipeline(sharp)?;
-            }
-        }
-        Ok(())
-    }
-
     fn pipeline(&self, sharp: Option<&SharpPermutation>) -> Result<&GraphicsPipeline> {
-        let PipelineMaker { state, display, .. } = self.maker;
+        let state = self.maker.state;
         let vertex = ShaderPermutation::new("grid.vert", 4);
-        let fragment = Self::row(display, sharp);
+        let fragment = Self::row(sharp);
         made_once(&self.made[usize::from(sharp.is_some())], || match sharp {
             None => self.maker.make("draw grid", &[vertex, fragment], state),
             Some(_) => {
@@ -145,8 +177,8 @@ impl DrawGrid {
         })
     }
 
-    pub fn row(display: bool, sharp: Option<&SharpPermutation>) -> ShaderPermutation {
-        let row = ShaderPermutation::new("grid.frag", 4).define("DISPLAY", display).define("PIXEL", sharp.is_some());
+    pub fn row(sharp: Option<&SharpPermutation>) -> ShaderPermutation {
+        let row = ShaderPermutation::new("grid.frag", 4).define("PIXEL", sharp.is_some());
         sharp.map_or(row.clone(), |sharp| sharp.pixel_row(row, false))
     }
 
@@ -206,5 +238,33 @@ impl DrawGrid {
             normal: grid.normal.extend(0.0).to_array(),
         });
         drawing.indexed(indices);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::asset::generate::plane;
+
+    /// Blocks cover every cell, and reach over them by no more than the overlap.
+    #[test]
+    fn blocks_cover_the_grid() {
+        for cells in [1, 3, 4, 25] {
+            let grid = Grid::find(&plane(3.0, cells)).unwrap();
+            let patches = Patches::new(&grid, grid.corner);
+            let mut covered = vec![0; (cells * cells) as usize];
+            for corners in patches.places.chunks_exact(4) {
+                let [low, high] = [corners[0], corners[3]].map(|place| place.map(|at| at.round() as usize));
+                for (y, x) in (low[1]..high[1]).flat_map(|y| (low[0]..high[0]).map(move |x| (y, x))) {
+                    covered[y * cells as usize + x] += 1;
+                }
+            }
+            assert!(covered.iter().all(|&times| times == 1), "{covered:?}");
+            assert_eq!(3 * patches.places.len(), 2 * 3 * patches.indices.len());
+            for (position, [x, y]) in patches.positions.iter().zip(&patches.places) {
+                let exact = grid.corner + (grid.sides[0] * *x + grid.sides[1] * *y) / cells as f32;
+                assert!(Vec3::from_array(*position).distance(exact) < 1e-5 && (0.0..=cells as f32).contains(x));
+            }
+        }
     }
 }

@@ -1,14 +1,12 @@
 //! Pass "draw": lit vertices to a picture.
 //!
 //! Inputs: for each entity its mesh (positions in metres from the centre of its bounding sphere, emission pattern,
-//! indices) and its range of the radiosity buffer. Output: RGBA of `width` x `height`, linear or encoded for a screen.
+//! indices) and its range of the radiosity buffer. Output: RGBA of `width` x `height`, linear.
 //! With one sample a pixel, alpha holds the tag of the entity that is seen, and the depth image is kept. With more
 //! samples they are averaged.
 
 pub mod camera;
-mod choices;
 pub mod grid;
-pub mod patches;
 pub mod pixel_light;
 pub mod show;
 pub mod smooth;
@@ -16,7 +14,6 @@ pub mod triangles;
 
 use crate::asset::grid::Grid;
 use crate::asset::mesh::Mesh;
-use crate::asset::picture::srgb_from_linear;
 use crate::draw::grid::{DrawGrid, DrawnGrid};
 use crate::draw::pixel_light::{ByPixel, PixelLight};
 use crate::draw::smooth::Smooth;
@@ -31,7 +28,6 @@ use crate::shaders::{Library, ShaderPermutation};
 use crate::sharp::SharpPermutation;
 use ash::vk;
 use bytemuck::{Pod, Zeroable};
-pub use choices::{Antialias, Finish, Shading};
 use glam::{Mat4, Vec3};
 use std::collections::HashSet;
 use std::ops::Range;
@@ -39,10 +35,56 @@ use std::sync::{Arc, OnceLock};
 
 /// Linear half floats. Their 11 bits are more than a PNG shows, and they take half the bandwidth of f32.
 const COLOR: vk::Format = vk::Format::R16G16B16A16_SFLOAT;
-/// Format for a screen: the shader encodes sRGB, and it takes half the bytes of half floats. With a format that encodes
-/// by itself (_SRGB), llvmpipe takes 1.5 times as long at four samples a pixel.
-const SHOWN: vk::Format = vk::Format::R8G8B8A8_UNORM;
 const DEPTH: vk::Format = vk::Format::D32_SFLOAT;
+
+/// How the edges of what is drawn are kept from showing as stairs.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+#[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
+#[serde(rename_all = "lowercase")]
+pub enum Antialias {
+    /// One sample a pixel; edges show as stairs.
+    None,
+    /// One sample a pixel, and outlines and creases smoothed by pass "smooth".
+    Outlines,
+    /// Four samples a pixel where the device can.
+    #[default]
+    Samples,
+}
+
+impl Antialias {
+    /// Default at interactive rates. On a GPU four samples cost little; a software device stores and
+    /// averages each.
+    pub fn usual(device: &Device) -> Self {
+        if device.info.is_software() { Antialias::Outlines } else { Antialias::Samples }
+    }
+
+    /// Samples a pixel on a device.
+    fn samples(self, device: &Device) -> u32 {
+        let limits = &device.limits;
+        let offered = limits.framebuffer_color_sample_counts & limits.framebuffer_depth_sample_counts;
+        if self == Antialias::Samples && offered.contains(vk::SampleCountFlags::TYPE_4) { 4 } else { 1 }
+    }
+}
+
+/// Where the light of sharp lights is evaluated.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+#[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
+#[serde(rename_all = "lowercase")]
+pub enum Shading {
+    /// At vertices only; pixels interpolate.
+    Vertex,
+    /// At pixels near shadow edges that are finer than the mesh's triangles; else at vertices.
+    Pixel,
+}
+
+impl Shading {
+    /// Default of the shading: pixels where they have several samples, as on a GPU and in files, else vertices. A
+    /// pixel that evaluates lights takes about 1 us of a core on llvmpipe, so frames full of shadow edges take up to 10
+    /// times as long as with vertices.
+    pub fn usual(antialias: Antialias) -> Self {
+        if antialias == Antialias::Samples { Shading::Pixel } else { Shading::Vertex }
+    }
+}
 
 pub enum DrawnMesh {
     Triangles(DrawnTriangles),
@@ -93,14 +135,6 @@ impl DrawnMesh {
     pub fn grid(&self) -> Option<&DrawnGrid> {
         if let DrawnMesh::Grid(grid, _) = self { Some(grid) } else { None }
     }
-
-    /// Device memory, bytes.
-    pub fn size_bytes(&self) -> u64 {
-        match self {
-            DrawnMesh::Triangles(triangles) => triangles.size_bytes(),
-            DrawnMesh::Grid(grid, _) => grid.size_bytes(),
-        }
-    }
 }
 
 pub struct DrawnEntity<'d> {
@@ -124,7 +158,6 @@ pub struct DrawnEntity<'d> {
     pub paint: Option<DrawnPaint<'d>>,
     /// How it reflects besides diffusely.
     pub gloss: Option<DrawnGloss<'d>>,
-    /// Input of its pixels, where they evaluate sharp lights.
     pub by_pixel: Option<ByPixel>,
 }
 
@@ -195,8 +228,6 @@ pub struct PipelineMaker {
     device: Arc<Device>,
     library: Library,
     state: GraphicsState,
-    /// Whether the picture is encoded.
-    display: bool,
     /// Where pixels evaluate sharp lights: how.
     sharp: Option<SharpPermutation>,
 }
@@ -224,7 +255,6 @@ fn made_once(
     Ok(made.get().expect("it was made"))
 }
 
-/// The pipelines and their images.
 pub struct Draw {
     triangles: DrawTriangles,
     grid: DrawGrid,
@@ -248,16 +278,12 @@ impl Draw {
         library: &Library,
         [width, height]: [u32; 2],
         antialias: Antialias,
-        finish: Finish,
         lights: PictureLights,
     ) -> Result<Self> {
         let samples = antialias.samples(device);
-        let color = if finish == Finish::Display { SHOWN } else { COLOR };
-        let shape = ImageShape { format: color, width, height, samples: 1 };
-        let state = GraphicsState { depth: Some(DEPTH), samples, ..GraphicsState::plain(color) };
-        let display = finish == Finish::Display;
-        let maker =
-            PipelineMaker { device: device.clone(), library: library.clone(), state, display, sharp: lights.pixels };
+        let shape = ImageShape { format: COLOR, width, height, samples: 1 };
+        let state = GraphicsState { depth: Some(DEPTH), samples, ..GraphicsState::plain(COLOR) };
+        let maker = PipelineMaker { device: device.clone(), library: library.clone(), state, sharp: lights.pixels };
         Ok(Draw {
             triangles: DrawTriangles::new(maker.clone(), lights.highlights),
             grid: DrawGrid::new(maker),
@@ -268,9 +294,7 @@ impl Draw {
             picture: Image::new(device, "picture", shape)?,
             batch_triangles: if device.info.is_software() { 1 << 18 } else { u32::MAX / 3 },
             is_made: false,
-            smooth: (antialias == Antialias::Outlines)
-                .then(|| Smooth::new(device, library, shape, display))
-                .transpose()?,
+            smooth: (antialias == Antialias::Outlines).then(|| Smooth::new(device, library, shape)).transpose()?,
         })
     }
 
@@ -282,22 +306,11 @@ impl Draw {
         triangles.and(grid)
     }
 
-    /// Makes the pipelines that another of the same scene has drawn with, so that shaders that fail do so now.
-    pub fn make_those_of(&self, other: &Draw) -> Result<()> {
-        self.triangles.make_those_of(&other.triangles)?;
-        self.grid.make_those_of(&other.grid)
-    }
-
-    /// Device memory of a pixel in the images of [`Draw::new`], bytes, as [`Draw::size_bytes`] counts it.
-    pub fn pixel_bytes(device: &Device, antialias: Antialias, finish: Finish) -> u64 {
+    /// Device memory of a pixel in the images of [`Draw::new`], bytes.
+    pub fn pixel_bytes(device: &Device, antialias: Antialias) -> u64 {
         let samples = u64::from(antialias.samples(device));
-        let color = if finish == Finish::Linear { 8 } else { 4 };
         let colors = 1 + u64::from(antialias == Antialias::Outlines) + if samples > 1 { samples } else { 0 };
-        colors * color + samples * 4
-    }
-
-    pub fn finish(&self) -> Finish {
-        if self.picture.shape.format == SHOWN { Finish::Display } else { Finish::Linear }
+        colors * 8 + samples * 4
     }
 
     pub fn samples(&self) -> u32 {
@@ -315,17 +328,6 @@ impl Draw {
         colors.chain([(&self.depth, Access::DepthWrite)])
     }
 
-    /// Device memory of the images, bytes: 8 a sample of linear colour, 4 of encoded colour and of depth.
-    pub fn size_bytes(&self) -> u64 {
-        let texels = |image: &Image| {
-            let shape = image.shape;
-            let texel_bytes = if shape.format == COLOR { 8 } else { 4 };
-            texel_bytes * u64::from(shape.width) * u64::from(shape.height) * u64::from(shape.samples)
-        };
-        let attachments = self.attachments().map(|(image, _)| image);
-        attachments.chain(self.smooth.iter().map(|smooth| &smooth.picture)).map(texels).sum()
-    }
-
     /// Draws all viewports, one after the other, over a background of one colour. Radiance above `white` is brought
     /// down to it, hue kept. Between the render passes of a large picture stand barriers of the pass's own.
     pub fn record<'r>(
@@ -338,10 +340,6 @@ impl Draw {
         // Its hue is kept, as that of surfaces is.
         let brightest = background.max_element();
         let background = if brightest > white { background * (white / brightest) } else { background };
-        let background = match self.finish() {
-            Finish::Linear => background,
-            Finish::Display => Vec3::from_array((background / white).to_array().map(srgb_from_linear)),
-        };
         let target = Target {
             color: self.samples.as_ref().unwrap_or(&self.picture),
             clear: Some(background.extend(1.0).to_array()),

@@ -16,7 +16,6 @@ pub struct ByPixel {
     pub self_first: u32,
 }
 
-/// Input of pixels that evaluate sharp lights.
 pub struct PixelLight<'d> {
     /// [`crate::layout::DeviceEntity`] of every entity.
     pub entities: &'d Buffer,

@@ -56,7 +56,6 @@ impl Strips {
         }
     }
 
-    /// The number of lines that were added.
     pub fn count(&self) -> usize {
         self.corners.len() / 4
     }
@@ -93,7 +92,6 @@ pub struct Lines {
 }
 
 impl Lines {
-    /// No lines yet.
     pub fn new(device: &Arc<Device>) -> Result<Self> {
         Ok(Lines {
             corners: Upload::new(device, "line corners", 16)?,
@@ -112,32 +110,23 @@ impl Lines {
         self.marks.write(&strips.marks)?;
         self.indices.write(&indices)
     }
-
-    /// Device memory, bytes.
-    pub fn size_bytes(&self) -> u64 {
-        self.corners.all_bytes() + self.marks.all_bytes() + self.indices.all_bytes()
-    }
 }
 
-/// The pipeline and its picture.
 pub struct Smooth {
     pipeline: GraphicsPipeline,
     pub picture: Image,
 }
 
 impl Smooth {
-    pub fn fragment(display: bool) -> ShaderPermutation {
-        ShaderPermutation::new("smooth.frag", 4)
-            .define("DISPLAY", display)
-            .number("TOLERANCE", TOLERANCE)
-            .number("SNAPPED", SNAPPED)
+    pub fn fragment() -> ShaderPermutation {
+        ShaderPermutation::new("smooth.frag", 4).number("TOLERANCE", TOLERANCE).number("SNAPPED", SNAPPED)
     }
 
-    /// For pictures of a shape. `display` says that they are encoded for a screen.
-    pub fn new(device: &Arc<Device>, library: &Library, shape: ImageShape, display: bool) -> Result<Self> {
+    /// For pictures of a shape.
+    pub fn new(device: &Arc<Device>, library: &Library, shape: ImageShape) -> Result<Self> {
         let state = GraphicsState::plain(shape.format);
         let vertex = library.shader(&ShaderPermutation::new("smooth.vert", 4))?;
-        let fragment = library.shader(&Self::fragment(display))?;
+        let fragment = library.shader(&Self::fragment())?;
         Ok(Smooth {
             pipeline: GraphicsPipeline::new(device, "smooth", &vertex, &fragment, state)?,
             picture: Image::new(device, "smooth picture", shape)?,

@@ -29,7 +29,6 @@ const LEAST_PX: f64 = 4.0;
 /// How much nearer triangles are drawn that are drawn again, in steps of depth: their corners round as they did before.
 const NEARER_STEPS: f32 = 4.0;
 
-/// A mesh's triangles on the device.
 pub struct DrawnTriangles {
     /// Positions in metres from the centre of the bounding sphere.
     pub positions: Buffer,
@@ -78,12 +77,6 @@ impl DrawnTriangles {
         })
     }
 
-    /// Device memory, bytes.
-    pub fn size_bytes(&self) -> u64 {
-        let paint = self.paint.as_ref().map_or(0, |paint| paint.size_bytes);
-        self.positions.size_bytes + self.emission.size_bytes + self.indices.size_bytes + paint
-    }
-
     /// Whether a device's texel views hold the mesh, and the vertices and the self-visibility of all meshes, so that
     /// its pixels can evaluate lights.
     pub fn fits_views(&self, device: &Device, vertices: &Buffer, self_cells: &Buffer) -> bool {
@@ -129,7 +122,6 @@ impl DrawnPaint<'_> {
     }
 }
 
-/// How a surface looks.
 #[derive(Clone, Copy)]
 pub enum Look<'p> {
     /// One reflectance.
@@ -200,7 +192,7 @@ enum Form {
 }
 
 impl Form {
-    const ALL: [Form; 4] = [Form::Vertices, Form::OverDepth, Form::Over, Form::Pixels];
+    const COUNT: usize = 4;
 }
 
 fn culled(entity: &DrawnEntity<'_>) -> vk::CullModeFlags {
@@ -212,7 +204,7 @@ pub struct DrawTriangles {
     /// How the sharp lights are evaluated that glossy surfaces have highlights of.
     highlights: Option<SharpPermutation>,
     /// By look and form; each is made where it is first drawn with.
-    made: [[OnceLock<GraphicsPipeline>; Form::ALL.len()]; Look::COUNT],
+    made: [[OnceLock<GraphicsPipeline>; Form::COUNT]; Look::COUNT],
 }
 
 impl DrawTriangles {
@@ -233,22 +225,8 @@ impl DrawTriangles {
         })
     }
 
-    pub fn make_those_of(&self, other: &DrawTriangles) -> Result<()> {
-        let highlights = self.highlights.as_ref();
-        let glossy =
-            [Detail::Rough, Detail::Mirror, Detail::Textured].map(|detail| Look::Glossy { highlights, detail });
-        for look in [Look::Plain, Look::Painted].into_iter().chain(glossy) {
-            for form in Form::ALL {
-                if other.made[look.number()][form as usize].get().is_some() {
-                    self.pipeline(look, form)?;
-                }
-            }
-        }
-        Ok(())
-    }
-
     fn pipeline(&self, look: Look<'_>, form: Form) -> Result<&GraphicsPipeline> {
-        let PipelineMaker { state, display, sharp, .. } = &self.maker;
+        let PipelineMaker { state, sharp, .. } = &self.maker;
         made_once(&self.made[look.number()][form as usize], || {
             let keeps = match form {
                 Form::Vertices => state.keeps,
@@ -256,12 +234,12 @@ impl DrawTriangles {
                 Form::Over => Keeps::ColorOver,
                 Form::Pixels => {
                     let sharp = sharp.as_ref().expect("pixels evaluate lights where a scene has sharp ones");
-                    let rows = Self::patch_rows(*display, state.samples, look, sharp);
+                    let rows = Self::patch_rows(state.samples, look, sharp);
                     let nearer = GraphicsState { nearer_steps: NEARER_STEPS, ..*state };
                     return self.maker.make("draw triangle pixels", &rows, nearer);
                 }
             };
-            let rows = Self::rows(*display, state.samples, look, form != Form::Vertices);
+            let rows = Self::rows(state.samples, look, form != Form::Vertices);
             self.maker.make("draw", &rows, GraphicsState { keeps, ..*state })
         })
     }
@@ -297,9 +275,9 @@ impl DrawTriangles {
 
     /// The rows of the shaders that show the light of vertices: vertex and fragment. With `over` what they draw lies over
     /// what is behind it.
-    pub fn rows(display: bool, samples: u32, look: Look<'_>, over: bool) -> [ShaderPermutation; 2] {
+    pub fn rows(samples: u32, look: Look<'_>, over: bool) -> [ShaderPermutation; 2] {
         let row = |file| look.macros(ShaderPermutation::new(file, 4), GLOSS_BINDINGS[0]);
-        let fragment = row("draw.frag").define("DISPLAY", display).define("OVER", over).define("SAMPLES", samples);
+        let fragment = row("draw.frag").define("OVER", over).define("SAMPLES", samples);
         let fragment = match look {
             Look::Glossy { highlights: Some(sharp), .. } => sharp.pixel_row(fragment, false),
             _ => fragment,
@@ -308,14 +286,11 @@ impl DrawTriangles {
     }
 
     /// The rows of the shaders whose pixels evaluate lights: vertex and fragment.
-    pub fn patch_rows(display: bool, samples: u32, look: Look<'_>, sharp: &SharpPermutation) -> [ShaderPermutation; 2] {
+    pub fn patch_rows(samples: u32, look: Look<'_>, sharp: &SharpPermutation) -> [ShaderPermutation; 2] {
         let row = |file| look.macros(ShaderPermutation::new(file, 4), GLOSS_BINDINGS[1]);
         [
             row("triangle.vert").number("LEAST_PX", LEAST_PX),
-            sharp.pixel_row(
-                row("triangle.frag").define("DISPLAY", display).define("SAMPLES", samples),
-                sharp.self_shadows,
-            ),
+            sharp.pixel_row(row("triangle.frag").define("SAMPLES", samples), sharp.self_shadows),
         ]
     }
 

@@ -1,12 +1,11 @@
-//! Changes between frames: the scene's lights and camera, the merge's variant, and shader files.
+//! Changes between frames: the scene's lights and camera, and shader files.
 
 use super::permutation::{harmonic_lights, usable};
 use super::{Frame, albedos, methods, permutation};
 use crate::bake;
 use crate::error::Result;
 use crate::merge::Merge;
-use crate::merge::calibrate;
-use crate::merge::variant::{MergePermutation, Variant};
+use crate::merge::variant::MergePermutation;
 use crate::scene::{Camera, Entity, Scene};
 use crate::sharp::{Sharp, SharpPermutation};
 
@@ -48,7 +47,10 @@ impl Frame {
         self.methods = methods(scene, self.options.lights);
         // A shader that knows of lights serves a scene without them as well.
         if harmonic_lights(scene, &self.methods) && !self.merge.permutation.lights {
-            self.compile_merge(MergePermutation { lights: true, ..self.merge.permutation })?;
+            let wanted = MergePermutation { lights: true, ..self.merge.permutation };
+            let usable = usable(&self.device, &self.buffers, scene.entities.len(), wanted);
+            self.merge = Merge::new(&self.device, &self.library, usable)?;
+            self.forget();
         }
         if sky {
             self.work.lists.renew();
@@ -69,41 +71,17 @@ impl Frame {
         self.picture.draw.batch_triangles = triangles.max(1);
     }
 
-    /// Merges by another variant from now on; `None` is the device's fastest.
-    pub fn set_variant(&mut self, variant: Option<Variant>) -> Result<()> {
-        let variant = variant.unwrap_or_else(|| calibrate::best_known(&self.device));
-        self.compile_merge(MergePermutation { variant, ..self.merge.permutation })
-    }
-
-    /// Compiles the merge for what is wanted, as far as the device allows it. If it was compiled for something else,
-    /// every cluster is merged again.
-    fn compile_merge(&mut self, wanted: MergePermutation) -> Result<()> {
-        let usable = usable(&self.device, &self.buffers, self.scene.entities.len(), wanted);
-        if usable != self.merge.permutation {
-            self.merge = Merge::new(&self.device, &self.library, usable)?;
-            self.forget();
-        }
-        Ok(())
-    }
-
     /// Builds anew what is made from any of the shader files named. What does not compile stays as it was.
     pub fn reload(&mut self, changed: &[String]) -> Result<()> {
         let library = self.library.clone();
         let uses = |entry: &str| library.files(entry).iter().any(|file| changed.contains(file));
-        let drawing = [
-            "draw.vert",
-            "draw.frag",
-            "grid.vert",
-            "grid.frag",
-            "triangle.vert",
-            "triangle.frag",
-            "smooth.vert",
-            "smooth.frag",
-        ];
-        if drawing.into_iter().any(uses) {
+        let draws = |part: &str| uses(&format!("{part}.vert")) || uses(&format!("{part}.frag"));
+        if ["draw", "grid", "triangle", "smooth"].into_iter().any(draws) {
             self.refine(false)?;
-            let drawer = self.drawer(&self.options, self.picture.draw.finish())?;
-            drawer.draw.make_those_of(&self.picture.draw)?;
+            let mut drawer = self.drawer(&self.options)?;
+            // Shaders that fail do so now.
+            self.make_pipelines_of(&drawer.draw)?;
+            drawer.draw.is_made = true;
             self.exchange(drawer);
             self.picture.other = None;
         }

@@ -19,7 +19,6 @@ struct ScreenTriangle {
     weights: DMat3,
     /// Radiance at the corners: emission and radiosity.
     radiance: [DVec3; 3],
-    /// The entity's tag.
     tag: f32,
     /// The entity, where it is drawn as a grid.
     grid: Option<usize>,

@@ -29,13 +29,13 @@ pub(super) fn reflections(
     texels: bool,
 ) -> Result<Option<Reflections>> {
     let is_glossy = |index: &usize| scene.entities[*index].reflection().is_some();
-    let lights = ShownLights::new(scene, methods);
+    let lights = shown_lights(scene, methods);
     let glossy: Vec<Glossy> = (0..scene.entities.len())
         .filter(is_glossy)
         .map(|entity| Glossy {
             entity,
             vertex_count: buffers.surface(entity).vertices.len() as u32,
-            lights: lights.of(entity),
+            lights: lights[entity],
         })
         .collect();
     if glossy.is_empty() {
@@ -50,37 +50,28 @@ pub(super) fn reflections(
     Reflections::new(device, library, sky, glossy, count, light_bytes, texels).map(Some)
 }
 
-/// The sharp lights of a scene at its first time.
-struct ShownLights {
-    /// Number, place and radius in metres, and the sum of its colours.
-    lights: Vec<(usize, DVec3, f64, f64)>,
-    /// Bounding spheres of all entities.
-    spheres: Vec<(DVec3, f64)>,
-}
-
-impl ShownLights {
-    fn new(scene: &Scene, methods: &[LightMethod]) -> Self {
-        let placed = scene.entities.iter().zip(scene.at(0.0));
-        let spheres: Vec<_> =
-            placed.map(|(entity, at)| at.sphere(scene.meshes[entity.mesh].bounding_sphere())).collect();
-        let lights = scene.entities.iter().enumerate().filter(|(i, entity)| entity.emits && methods[*i].is_sharp());
-        let lights = lights.map(|(i, entity)| (i, spheres[i].0, spheres[i].1, entity.emission.element_sum().into()));
-        ShownLights { lights: lights.collect(), spheres }
-    }
-
-    /// Those that are strongest at the centre of a receiver.
-    fn of(&self, receiver: usize) -> [u32; SHOWN_LIGHTS] {
-        let (centre, radius_m) = self.spheres[receiver];
-        let strength = |&(light, at, light_radius_m, emission): &(usize, DVec3, f64, f64)| {
+/// The sharp lights that are strongest at the centre of each entity, at the scene's first time.
+fn shown_lights(scene: &Scene, methods: &[LightMethod]) -> Vec<[u32; SHOWN_LIGHTS]> {
+    let placed = scene.entities.iter().zip(scene.at(0.0));
+    let spheres: Vec<(DVec3, f64)> =
+        placed.map(|(entity, at)| at.sphere(scene.meshes[entity.mesh].bounding_sphere())).collect();
+    let is_sharp = |index: &usize| scene.entities[*index].emits && methods[*index].is_sharp();
+    let lights: Vec<usize> = (0..scene.entities.len()).filter(is_sharp).collect();
+    let strongest = |receiver: usize| {
+        let (centre, radius_m) = spheres[receiver];
+        let strength = |&light: &usize| {
+            let (at, light_radius_m) = spheres[light];
             let distance_m = at.distance(centre).max(radius_m + light_radius_m);
-            (light != receiver).then(|| (emission * (light_radius_m / distance_m).powi(2), light))
+            let emission = f64::from(scene.entities[light].emission.element_sum());
+            (emission * (light_radius_m / distance_m).powi(2), light)
         };
-        let mut ranked: Vec<(f64, usize)> = self.lights.iter().filter_map(strength).collect();
+        let mut ranked: Vec<(f64, usize)> = lights.iter().filter(|&&light| light != receiver).map(strength).collect();
         ranked.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
         let mut shown = [NONE; SHOWN_LIGHTS];
         shown.iter_mut().zip(ranked).for_each(|(slot, (_, light))| *slot = light as u32);
         shown
-    }
+    };
+    (0..scene.entities.len()).map(strongest).collect()
 }
 
 /// What the pixels of a glossy entity look up.
@@ -136,7 +127,6 @@ impl Frame {
         self.reflections.as_mut().map_or(Ok(()), |reflections| reflections.entities.write(&entities))
     }
 
-    /// How the pixels of an entity reflect.
     pub(super) fn drawn_gloss(&self, entity: &Entity) -> Option<DrawnGloss<'_>> {
         let detail = detail(entity)?;
         let MapIndices { gloss, normal, glow, .. } = entity.maps;
@@ -144,7 +134,6 @@ impl Frame {
         Some(DrawnGloss { detail, maps: [gloss, normal, glow].map(texture) })
     }
 
-    /// What the pass "gloss" works on.
     pub(super) fn gloss_work(&self) -> Option<(&Reflections, ReflectionInputs<'_>)> {
         let inputs = ReflectionInputs {
             vertices: &self.buffers.vertices,
@@ -178,7 +167,6 @@ impl Frame {
         Ok([found.collect(), wanted.collect()])
     }
 
-    /// What pixels read of reflections.
     pub(super) fn drawn_reflections(&self) -> Option<DrawnReflections<'_>> {
         let of = |reflections| DrawnReflections {
             reflections,

@@ -9,7 +9,7 @@
 mod change;
 mod draw_twin;
 mod gloss;
-pub mod memory;
+mod memory;
 mod options;
 mod permutation;
 mod picture;
@@ -18,7 +18,6 @@ mod pose;
 mod prepare;
 mod radiosity;
 mod record;
-mod room;
 mod sky;
 mod twin;
 mod viewport;
@@ -51,12 +50,12 @@ use sky::SkyLight;
 use std::ops::Range;
 use std::sync::Arc;
 
+pub use memory::PictureMemory;
 #[cfg(feature = "cli")]
 pub use options::picture_size;
 pub use options::{Options, RenderOptions};
 pub use prepare::Relight;
 pub use record::{MergeWork, PictureTarget, PictureWork, record};
-pub use room::PictureMemory;
 pub use viewport::{RadiositySource, Viewport};
 
 /// How the light of each entity of a scene is computed.
@@ -78,7 +77,6 @@ pub struct Frame {
     groups: Groups,
     /// What the own visibility of the vertices was baked for.
     surfaces: SurfacePlan,
-    /// How the light of each entity is computed.
     methods: Vec<LightMethod>,
     options: Options,
     /// Baked and uploaded data.
@@ -95,7 +93,6 @@ pub struct Frame {
     radiosity: RadiosityBuffers,
     /// What passes light on within rigid groups, where it bounces.
     bounce: Option<Bounce>,
-    /// What glossy surfaces reflect.
     reflections: Option<Reflections>,
     picture: FramePicture,
 }
@@ -332,7 +329,6 @@ impl Frame {
         })
     }
 
-    /// Order in which an entity's vertices are stored.
     fn order(&self, entity: usize) -> &[u32] {
         &self.buffers.surface(entity).order
     }
@@ -381,7 +377,6 @@ impl Frame {
         self.merge.permutation.variant
     }
 
-    /// What its merge was compiled for.
     pub fn permutation(&self) -> MergePermutation {
         self.merge.permutation
     }
@@ -391,7 +386,6 @@ impl Frame {
         self.work.merged
     }
 
-    /// Vertices that are lit.
     pub fn receiver_vertex_count(&self) -> usize {
         self.work.lists.clusters.iter().map(|cluster| cluster.vertex_count as usize).sum()
     }

@@ -1,16 +1,15 @@
 //! Pictures of a frame: prepared, drawn into images of one size, read back.
 
+use super::memory::READBACK_PIXEL_BYTES;
 use super::permutation::pixel_shading;
 use super::record::PictureWork;
-use super::room::READBACK_PIXEL_BYTES;
 use super::viewport::Viewport;
 use super::{Frame, Options, gloss};
 use crate::asset::edges::Edges;
-use crate::asset::picture::linear_from_srgb;
 use crate::draw::pixel_light::PixelLight;
 use crate::draw::smooth::Lines;
 use crate::draw::triangles::DrawnSurface;
-use crate::draw::{Antialias, Draw, DrawnViewport, Finish, PictureLights};
+use crate::draw::{Antialias, Draw, DrawnViewport, PictureLights};
 use crate::error::Result;
 use crate::gpu::{Buffer, BufferKind, Device, Image, Timing};
 use crate::scene::Placement;
@@ -21,7 +20,6 @@ use std::collections::HashSet;
 use std::ops::Range;
 use std::sync::Arc;
 
-/// A way to make pictures.
 pub(super) struct Drawer {
     pub draw: Draw,
     pixels: Option<SharpPermutation>,
@@ -46,10 +44,10 @@ pub(super) struct FramePicture {
 }
 
 impl FramePicture {
-    /// Makes linear pictures of the size in `options`.
+    /// Makes pictures of the size in `options`.
     pub fn new(device: &Arc<Device>, library: &Library, options: &Options, lights: PictureLights) -> Result<Self> {
         Ok(FramePicture {
-            draw: Draw::new(device, library, options.size, options.antialias, Finish::Linear, lights)?,
+            draw: Draw::new(device, library, options.size, options.antialias, lights)?,
             refined: false,
             other: None,
             readback: readback(device, options.size)?,
@@ -60,7 +58,6 @@ impl FramePicture {
     }
 }
 
-/// Room for a picture of either finish.
 fn readback(device: &Arc<Device>, [width, height]: [u32; 2]) -> Result<Buffer> {
     Buffer::new(device, "readback", BufferKind::Readback, READBACK_PIXEL_BYTES * u64::from(width) * u64::from(height))
 }
@@ -68,9 +65,13 @@ fn readback(device: &Arc<Device>, [width, height]: [u32; 2]) -> Result<Buffer> {
 impl Frame {
     /// Makes the pipelines of all that pictures of light show, before the first one.
     pub(super) fn make_pipelines(&mut self) -> Result<()> {
-        if std::mem::replace(&mut self.picture.draw.is_made, true) {
-            return Ok(());
+        if !std::mem::replace(&mut self.picture.draw.is_made, true) {
+            self.make_pipelines_of(&self.picture.draw)?;
         }
+        Ok(())
+    }
+
+    pub(super) fn make_pipelines_of(&self, draw: &Draw) -> Result<()> {
         let is_grid = |entity: &usize| self.buffers.surface(*entity).drawn.grid().is_some();
         let (grids, triangles): (Vec<usize>, Vec<usize>) = (0..self.scene.entities.len()).partition(is_grid);
         let surface = |index: usize| DrawnSurface {
@@ -79,7 +80,7 @@ impl Frame {
             transparent: self.scene.entities[index].transparent,
         };
         let surfaces: HashSet<DrawnSurface> = triangles.into_iter().map(surface).collect();
-        self.picture.draw.make(surfaces, !grids.is_empty())
+        draw.make(surfaces, !grids.is_empty())
     }
 
     /// Input of [`super::record()`] for the picture that was prepared last; `white` as in [`Frame::render`].
@@ -109,25 +110,19 @@ impl Frame {
         self.picture.draw.finished()
     }
 
-    /// The last picture: linear RGB, three floats a pixel, rows from the top. A picture made for a screen is decoded:
-    /// white is 1.
+    /// The last picture: linear RGB, three floats a pixel, rows from the top.
     pub fn picture(&self) -> Vec<f32> {
         let shape = self.picture.draw.picture.shape;
         let pixels = (shape.width * shape.height) as usize;
-        if self.picture.draw.finish() == Finish::Display {
-            let bytes: Vec<u8> = self.picture.readback.read(0, 4 * pixels);
-            let linear = |byte: u8| linear_from_srgb(f32::from(byte) / 255.0);
-            return bytes.chunks_exact(4).flat_map(|p| [linear(p[0]), linear(p[1]), linear(p[2])]).collect();
-        }
         let halves: Vec<f16> = self.picture.readback.read(0, 4 * pixels);
         halves.chunks_exact(4).flat_map(|p| [p[0].to_f32(), p[1].to_f32(), p[2].to_f32()]).collect()
     }
 
-    pub(super) fn drawer(&self, options: &Options, finish: Finish) -> Result<Drawer> {
+    pub(super) fn drawer(&self, options: &Options) -> Result<Drawer> {
         let sharp = self.sharp.as_ref().map(|sharp| sharp.permutation);
         let pixels = pixel_shading(&self.device, options, &self.buffers, self.radiosity.soft(), sharp);
         let lights = PictureLights { pixels, highlights: sharp };
-        let draw = Draw::new(&self.device, &self.library, options.size, options.antialias, finish, lights)?;
+        let draw = Draw::new(&self.device, &self.library, options.size, options.antialias, lights)?;
         Ok(Drawer { draw, pixels, antialias: options.antialias })
     }
 
@@ -141,8 +136,8 @@ impl Frame {
     }
 
     /// Makes pictures with these options from now on, and no others.
-    pub(super) fn set_pictures(&mut self, options: Options, finish: Finish) -> Result<()> {
-        let drawer = self.drawer(&options, finish)?;
+    pub(super) fn set_pictures(&mut self, options: Options) -> Result<()> {
+        let drawer = self.drawer(&options)?;
         self.exchange(drawer);
         self.options = options;
         self.picture.other = None;
@@ -161,7 +156,7 @@ impl Frame {
             Some(drawer) => drawer,
             None => {
                 let options = Options { antialias: Antialias::Samples, ..self.options };
-                self.drawer(&options, self.picture.draw.finish())?
+                self.drawer(&options)?
             }
         };
         self.picture.other = Some(self.exchange(drawer));
@@ -169,7 +164,6 @@ impl Frame {
         Ok(self.sharp.as_ref().is_some_and(|sharp| sharp.permutation.edges != self.wants_edges()))
     }
 
-    /// Whether pictures are refined.
     pub fn is_refined(&self) -> bool {
         self.picture.refined
     }
@@ -206,18 +200,16 @@ impl Frame {
         if size != self.options.size {
             self.refine(false)?;
             let options = Options { size, ..self.options };
-            self.set_pictures(options, self.picture.draw.finish())?;
+            self.set_pictures(options)?;
             self.picture.readback = readback(&self.device, size)?;
         }
         Ok(())
     }
 
-    /// Makes pictures for files or for a screen from now on, edges smoothed one way or another. A frame begins with
-    /// linear ones.
-    pub fn set_finish(&mut self, finish: Finish, antialias: Antialias) -> Result<()> {
-        if (finish, antialias) != (self.picture.draw.finish(), self.options.antialias) {
-            let options = Options { antialias, ..self.options };
-            self.set_pictures(options, finish)?;
+    /// Smooths edges another way from now on.
+    pub fn set_antialias(&mut self, antialias: Antialias) -> Result<()> {
+        if antialias != self.options.antialias {
+            self.set_pictures(Options { antialias, ..self.options })?;
         }
         Ok(())
     }
@@ -226,7 +218,7 @@ impl Frame {
     /// pixel, rows from the top; `white` as in [`Frame::render`]. Waits.
     pub fn still(&mut self, placements: &[Placement], white: f32) -> Result<Vec<f32>> {
         self.device.settle();
-        let drawer = self.drawer(&Options { antialias: Antialias::Samples, ..self.options }, Finish::Linear)?;
+        let drawer = self.drawer(&Options { antialias: Antialias::Samples, ..self.options })?;
         let before = self.exchange(drawer);
         let outcome = self.render(placements, Some(white)).map(|_| self.picture());
         self.exchange(before);

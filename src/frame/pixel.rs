@@ -97,8 +97,4 @@ impl PixelChains {
         self.known = Some((entities.clone(), scene_bounds.entities.clone()));
         Ok(())
     }
-
-    pub fn size_bytes(&self) -> u64 {
-        self.entities.all_bytes() + self.entries.all_bytes() + self.chains.all_bytes()
-    }
 }

@@ -13,8 +13,6 @@ use crate::lists::incremental::{Member, State};
 use crate::lists::sight::TriangleRun;
 use crate::scene::{Entity, LightMethod, Placement};
 use crate::scene_buffers::{self, FieldSlot};
-use crate::sh::basis::{MAX_COEFFICIENTS, evaluate};
-use crate::sh::cube::{self, FACE_COUNT, texel_st};
 use crate::sh::rotation::turns;
 use glam::DVec3;
 use std::f64::consts::PI;
@@ -208,17 +206,4 @@ pub(super) fn clusters(
         Member { cluster, bounds: *bounds, faces: *faces }
     };
     surface.clusters.iter().zip(&surface.faces).enumerate().map(cluster).collect()
-}
-
-/// Largest value of a projected sky, of any colour, on a grid of directions that is fine against its bands; at least 0.
-pub(super) fn brightest(channels: &[Vec<f64>; 3], bands: usize) -> f64 {
-    let mut basis = [0.0; MAX_COEFFICIENTS];
-    let mut most = 0.0_f64;
-    for (face, y, x) in (0..FACE_COUNT).flat_map(|face| (0..256).map(move |i| (face, i / 16, i % 16))) {
-        evaluate(bands, cube::direction(face, texel_st(x, 16), texel_st(y, 16)), &mut basis);
-        for channel in channels {
-            most = most.max(channel.iter().zip(&basis).map(|(c, y)| c * y).sum());
-        }
-    }
-    most
 }

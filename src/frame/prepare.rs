@@ -69,11 +69,6 @@ impl ClusterWork {
         TexelView::fits(device, ENTRY_FORMAT, self.entries.size_bytes)
             && TexelView::fits(device, CLUSTER_FORMAT, self.clusters.size_bytes)
     }
-
-    pub fn size_bytes(&self) -> u64 {
-        let uploads = [&self.entities, &self.clusters, &self.entries];
-        uploads.iter().map(|upload| upload.all_bytes()).sum()
-    }
 }
 
 impl Frame {

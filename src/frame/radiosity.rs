@@ -112,11 +112,6 @@ impl RadiosityBuffers {
         }
     }
 
-    pub fn size_bytes(&self) -> u64 {
-        let direct = self.direct.iter().flat_map(|of| of.soft.iter().chain(&of.lamps).chain([&of.all]));
-        self.merged.size_bytes + self.soft.iter().chain(direct).map(|buffer| buffer.size_bytes).sum::<u64>()
-    }
-
     /// Replaces an entity's values. They come in the mesh's order of vertices, which `order` lists as they are stored.
     pub fn write(&mut self, entity: usize, order: &[u32], values: &[[f32; 3]]) -> Result<()> {
         assert_eq!(values.len(), order.len(), "radiosity of entity {entity}");

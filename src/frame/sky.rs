@@ -1,11 +1,11 @@
 //! Distant light as a frame reads it.
 
-use super::pose;
 use crate::error::Result;
 use crate::field::quantity::channel_stride;
 use crate::gpu::{Device, Upload};
 use crate::scene::Scene;
-use crate::sh::basis::{Y00, coefficient_count};
+use crate::sh::basis::{MAX_COEFFICIENTS, Y00, coefficient_count, evaluate};
+use crate::sh::cube::{self, FACE_COUNT, texel_st};
 use glam::Vec3;
 use std::sync::Arc;
 
@@ -37,9 +37,22 @@ impl SkyLight {
         for (to, from) in floats.chunks_exact_mut(stride).zip(&channels) {
             to.iter_mut().zip(&from[..coefficient_count(bands)]).for_each(|(to, from)| *to = *from as f32);
         }
-        self.brightest = pose::brightest(&channels, bands);
+        self.brightest = brightest(&channels, bands);
         self.background = Vec3::from_array(channels.map(|c| (c[0] * Y00) as f32));
         floats.extend(self.volume.iter().flatten().flatten());
         self.coefficients.write(&floats)
     }
+}
+
+/// Largest value of a projected sky, of any colour, on a grid of directions that is fine against its bands; at least 0.
+fn brightest(channels: &[Vec<f64>; 3], bands: usize) -> f64 {
+    let mut basis = [0.0; MAX_COEFFICIENTS];
+    let mut most = 0.0_f64;
+    for (face, y, x) in (0..FACE_COUNT).flat_map(|face| (0..256).map(move |i| (face, i / 16, i % 16))) {
+        evaluate(bands, cube::direction(face, texel_st(x, 16), texel_st(y, 16)), &mut basis);
+        for channel in channels {
+            most = most.max(channel.iter().zip(&basis).map(|(c, y)| c * y).sum());
+        }
+    }
+    most
 }

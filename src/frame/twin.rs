@@ -18,6 +18,7 @@ use crate::sharp::twin::{SharpLight, SharpObject, SharpTwin, SurfacePoint};
 use glam::DVec3;
 use std::collections::{BTreeSet, HashSet};
 use std::f64::consts::PI;
+use std::ops::Range;
 
 impl Frame {
     /// Counts lookups that the lists of all clusters leave off, by reason, and bounds the light in them. It looks at
@@ -28,11 +29,15 @@ impl Frame {
             let Entity { mesh, emits, .. } = self.scene.entities[entity];
             self.buffers.meshes[mesh].is_empty(emits)
         };
+        let sights = self.sights(placements, &[self.whole()]).filter(|_| self.options.skip.hidden);
+        let triangles = |indices: Vec<Range<u32>>| indices.iter().map(|range| range.len() / 3).sum::<usize>();
+        let drawn = self.drawn_entities(placements, self.options.size).into_iter();
+        let undrawn: usize = drawn.map(|of| triangles(of.mesh.seen(None)) - triangles(of.indices)).sum();
         Counts {
             empty: entities().filter(empty).count() as u64,
             unseen: entities().filter(|&entity| !self.groups.is_seen(entity)).count() as u64,
-            hidden: if self.options.skip.hidden { self.hidden_count(placements) as u64 } else { 0 },
-            undrawn: self.undrawn_count(placements) as u64,
+            hidden: sights.map_or(0, |sights| self.work.lists.hidden_count(&sights) as u64),
+            undrawn: undrawn as u64,
             ..self.work.lists.counts(&self.state(placements))
         }
     }

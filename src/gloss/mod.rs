@@ -237,13 +237,6 @@ impl Reflections {
         let halves: Vec<[f16; 16]> = self.through.download_range(bytes)?;
         Ok(halves.iter().map(|of| of.map(f64::from)).collect())
     }
-
-    pub fn size_bytes(&self) -> u64 {
-        let buffers =
-            [&self.sky.products, &self.groups, &self.shown_lights, &self.through, &self.shown_shares, &self.reflected];
-        let textures = self.sky.map.size_bytes + self.lobes.size_bytes;
-        buffers.iter().map(|buffer| buffer.size_bytes).sum::<u64>() + textures + self.entities.all_bytes()
-    }
 }
 
 impl<'b> DrawnReflections<'b> {

@@ -72,7 +72,6 @@ impl Access {
         }
     }
 
-    /// Whether the access may change the resource.
     pub fn writes(self) -> bool {
         matches!(self, Access::TransferWrite | Access::ComputeWrite | Access::ColorWrite | Access::DepthWrite)
     }
@@ -174,14 +173,13 @@ impl Tracker {
         }
         if access.writes() {
             uses.retain(|earlier| earlier.range.start < range.start || range.end < earlier.range.end);
-        } else if uses.iter().any(|u| u.access == access && u.range == range && u.pass == pass) {
-            // The same pass repeats the same use: a later writer has to wait for the last one only.
+        } else {
+            // Where the same pass repeats the same use: a later writer waits for the last one only.
             uses.retain(|u| !(u.access == access && u.range == range && u.pass == pass));
         }
         uses.push(Use { order: self.order, range, access, pass: pass.to_owned() });
     }
 
-    /// Reports all objections together.
     pub fn verdict(&self) -> Result<()> {
         if self.objections.is_empty() {
             return Ok(());

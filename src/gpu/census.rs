@@ -5,7 +5,6 @@ use super::shader::Shader;
 use crate::error::{Error, Result};
 use rspirv::dr::{Block, Instruction, Module, Operand};
 use rspirv::spirv::{Op, StorageClass};
-use serde::Serialize;
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 
 /// `Fma` of the extended instruction set GLSL.std.450.
@@ -13,20 +12,17 @@ const FMA: u32 = 50;
 
 /// Counts for one iteration of the longest loop, or for the whole shader if it has no loop. The code is not executed:
 /// both sides of a branch count, which is what they cost on devices that mask lanes.
-#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+#[derive(Clone, Debug, Default)]
 pub struct Census {
     /// Additions, subtractions and multiplications of floats, component by component.
     pub flops: u32,
-    /// All other float operations: divisions, roots, minima, conversions.
-    pub other_float: u32,
     /// Texels fetched, and samples taken by a sampler, by the binding's name.
     pub fetches: BTreeMap<String, u32>,
-    /// Bytes loaded from storage and uniform blocks, by the block's name.
-    pub block_bytes: BTreeMap<String, u32>,
+    /// Bytes loaded from storage and uniform blocks.
+    pub block_bytes: u32,
 }
 
 impl Census {
-    /// Counts a shader.
     pub fn new(shader: &Shader) -> Result<Self> {
         let module = rspirv::dr::load_words(&shader.spirv)
             .map_err(|error| Error::Failed(format!("{}: unreadable SPIR-V: {error}", shader.name)))?;
@@ -38,7 +34,6 @@ impl Census {
         Ok(census)
     }
 
-    /// Number of texels fetched from all bindings.
     pub fn fetch_count(&self) -> u32 {
         self.fetches.values().sum()
     }
@@ -111,11 +106,9 @@ impl<'m> Counter<'m> {
             Op::ExtInst if instruction.operands.get(1) == Some(&Operand::LiteralExtInstInteger(FMA)) => {
                 census.flops += 2 * components();
             }
-            Op::FDiv | Op::FNegate | Op::ExtInst | Op::ConvertFToU | Op::ConvertFToS | Op::ConvertUToF => {
-                census.other_float += components();
-            }
             Op::ImageFetch | Op::ImageSampleExplicitLod => {
-                let name = ids(instruction).next().map_or_else(String::new, |image| self.name(image));
+                let root = ids(instruction).next().and_then(|image| self.roots.get(&image));
+                let name = root.map_or_else(String::new, |&root| self.reader.variable_name(root));
                 *census.fetches.entry(name).or_default() += 1;
             }
             Op::Load => {
@@ -124,14 +117,10 @@ impl<'m> Counter<'m> {
                 let block =
                     matches!(class, Some(Operand::StorageClass(StorageClass::StorageBuffer | StorageClass::Uniform)));
                 if let (true, Some(ty)) = (block, instruction.result_type) {
-                    *census.block_bytes.entry(self.name(*root)).or_default() += self.reader.size_bytes(ty);
+                    census.block_bytes += self.reader.size_bytes(ty);
                 }
             }
             _ => {}
         }
-    }
-
-    fn name(&self, id: u32) -> String {
-        self.roots.get(&id).map_or_else(String::new, |&root| self.reader.variable_name(root))
     }
 }

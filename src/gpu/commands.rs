@@ -59,9 +59,6 @@ impl<'r> Commands<'r> {
 
     /// Runs `record` as one labelled, timed pass. On some devices full barriers stand around it, see
     /// [`Commands::separates_passes`].
-    ///
-    /// # Panics
-    /// When passes nest or a recording has more than 64 of them.
     pub fn pass(&mut self, name: &str, record: impl FnOnce(&mut Self) -> Result<()>) -> Result<()> {
         assert!(!self.in_pass, "{}: pass {name} starts inside another", self.recording.name);
         let index = self.recording.passes.len() as u32;
@@ -180,9 +177,6 @@ impl<'r> Commands<'r> {
     }
 
     /// Runs a compute pipeline over `elements` invocations in x, y and z; `resources` stand at their binding numbers.
-    ///
-    /// # Panics
-    /// When the resources or push constants do not match the shader's declarations.
     pub fn dispatch<P: Pod>(
         &mut self,
         pipeline: &'r ComputePipeline,
@@ -210,9 +204,6 @@ impl<'r> Commands<'r> {
     }
 
     /// Copies a byte range of `from` to a byte offset of `to`.
-    ///
-    /// # Panics
-    /// When either range is out of bounds.
     pub fn copy_range(&mut self, from: &'r Buffer, range: Range<u64>, to: &'r Buffer, offset_bytes: u64) {
         let size = range.end - range.start;
         assert!(range.end <= from.size_bytes, "{}: copy of {range:?} of {}", from.name, from.size_bytes);
@@ -263,9 +254,6 @@ impl<'r> Commands<'r> {
     }
 
     /// Copies a whole single-sampled image into another image of the same size and format.
-    ///
-    /// # Panics
-    /// When their sizes or formats differ.
     pub fn copy_between(&mut self, from: &'r Image, to: &'r Image) {
         let of = |image: &Image| (image.shape.format, image.shape.width, image.shape.height);
         assert_eq!(of(from), of(to), "{} and {}", from.name, to.name);
@@ -282,14 +270,11 @@ impl<'r> Commands<'r> {
 
     /// Ends the recording, submits it and waits. Returns the duration of each pass, in order.
     pub fn submit(self) -> Result<Vec<Timing>> {
-        self.end()?.run(Signals::default())?.wait()
+        self.end()?.run()?.wait()
     }
 
     /// Ends the recording and submits it without waiting. The recording must begin with [`Commands::after_flights`],
     /// because earlier recordings may still use its resources.
-    ///
-    /// # Panics
-    /// When [`FLIGHTS`](super::FLIGHTS) recordings are already in flight.
     pub fn launch(self) -> Result<Flight> {
         self.end()?.launch(Signals::default())
     }

@@ -21,7 +21,6 @@ pub enum Bind<'r> {
     Buffer(&'r Buffer),
     /// A byte range of a buffer. Its start keeps the device's offset alignment (at most 256 bytes).
     Range(&'r Buffer, Range<u64>),
-    /// A texel view.
     Texel(TexelView<'r>),
     /// An image that is read with `texelFetch`.
     Image(&'r Image),
@@ -31,7 +30,6 @@ pub enum Bind<'r> {
     None,
 }
 
-/// Panics because a resource does not match its binding.
 fn complain(pass: &str, binding: &Binding, what: &str) -> ! {
     panic!("pass {pass}, binding {} ({}): {what}", binding.index, binding.name)
 }

@@ -1,9 +1,10 @@
 //! Logical device and queue: the root that every other Vulkan object keeps alive.
 
+use super::Checked;
 use super::instance::{Instance, OwnInstance};
 use super::select::{Candidate, choose, physical_devices, queue_family};
+use super::shader::{sealed, unsealed};
 use super::validation::Validation;
-use super::{Checked, pipeline_cache};
 use crate::error::Result;
 use ash::vk;
 use std::ffi::{CStr, CString};
@@ -27,7 +28,6 @@ pub fn required_features() -> vk::PhysicalDeviceVulkan13Features<'static> {
     vk::PhysicalDeviceVulkan13Features::default().dynamic_rendering(true).synchronization2(true)
 }
 
-/// Parts of a [`Device`].
 pub(super) struct Parts {
     pub physical: vk::PhysicalDevice,
     pub handle: ash::Device,
@@ -44,7 +44,6 @@ pub struct Device {
     pub(super) handle: ash::Device,
     #[cfg(feature = "view")]
     pub(super) physical: vk::PhysicalDevice,
-    /// Whether a caller made it, uses its queue too and destroys it.
     is_shared: bool,
     pub(super) queue: Mutex<vk::Queue>,
     /// Fences of launched recordings; see `flight`.
@@ -53,14 +52,12 @@ pub struct Device {
     pub(super) memory: vk::PhysicalDeviceMemoryProperties,
     pub(super) names: Option<ash::ext::debug_utils::Device>,
     pub(super) pipeline_cache: vk::PipelineCache,
-    pub(super) pipeline_key: String,
-    /// Limits of the physical device.
+    pipeline_key: String,
     pub limits: vk::PhysicalDeviceLimits,
-    /// Name, driver and kind of the physical device.
     pub info: Candidate,
-    /// Folder for compiled shaders and the pipeline cache.
     pub cache_dir: Option<PathBuf>,
     pub(super) next_resource: AtomicU64,
+    pub(super) allocated_bytes: AtomicU64,
     omitted_barrier: AtomicUsize,
     /// Last: the instance outlives the device.
     pub(super) instance: Arc<Instance>,
@@ -95,7 +92,7 @@ impl Device {
         let info = choose(&candidates, options.device.as_deref())?.clone();
         let physical = devices[info.index].0;
         if info.is_software() {
-            super::heap::keep_freed_memory();
+            super::process::keep_freed_memory();
         }
         Self::open(&Arc::new(instance), physical, info, swapchain, options.cache_dir.clone())
     }
@@ -153,11 +150,12 @@ impl Device {
             memory,
             names,
             pipeline_cache: vk::PipelineCache::null(),
-            pipeline_key: pipeline_cache::key(&properties),
+            pipeline_key: pipeline_key(&properties),
             limits: properties.limits,
             info,
             cache_dir,
             next_resource: AtomicU64::new(1),
+            allocated_bytes: AtomicU64::new(0),
             omitted_barrier: AtomicUsize::new(usize::MAX),
             instance: instance.clone(),
         };
@@ -168,6 +166,11 @@ impl Device {
     /// Whether a caller made the device, uses its queue too and destroys it.
     pub fn is_shared(&self) -> bool {
         self.is_shared
+    }
+
+    /// Memory of all buffers and images that exist now, bytes.
+    pub fn allocated_bytes(&self) -> u64 {
+        self.allocated_bytes.load(Ordering::Relaxed)
     }
 
     /// Size of the largest device-local heap in bytes.
@@ -182,7 +185,6 @@ impl Device {
         limits.max_image_dimension2_d.min(limits.max_framebuffer_width).min(limits.max_framebuffer_height)
     }
 
-    /// Messages of the validation layer since the last call.
     pub fn take_validation_messages(&self) -> Vec<String> {
         self.instance.messages.take()
     }
@@ -197,6 +199,33 @@ impl Device {
         self.omitted_barrier.load(Ordering::Relaxed)
     }
 
+    /// The driver's compiled pipelines on disk. Only what this program wrote, for this very device, reaches a driver.
+    fn pipeline_cache_path(&self) -> Option<PathBuf> {
+        Some(self.cache_dir.as_ref()?.join(format!("pipelines-{}.bin", self.info.uuid)))
+    }
+
+    /// A pipeline cache that begins with what is on disk.
+    fn load_pipeline_cache(&self) -> Result<vk::PipelineCache> {
+        let file = self.pipeline_cache_path().and_then(|path| crate::files::read(&path).ok()).unwrap_or_default();
+        let data = unsealed(&self.pipeline_key, &file).unwrap_or_default();
+        if data.is_empty() && !file.is_empty() {
+            log::info!("the pipeline cache on disk is damaged or belongs to another driver, and is replaced");
+        }
+        let create = vk::PipelineCacheCreateInfo::default().initial_data(data);
+        // SAFETY: the data is what this device gave before; destroyed in `Drop`.
+        unsafe { self.handle.create_pipeline_cache(&create, None) }.checked("vkCreatePipelineCache", "pipeline cache")
+    }
+
+    /// Writes the pipeline cache to disk through a temporary file. A failure is logged and is no error.
+    pub fn save_pipeline_cache(&self) {
+        let Some(path) = self.pipeline_cache_path() else { return };
+        // SAFETY: the cache is alive.
+        let Ok(data) = (unsafe { self.handle.get_pipeline_cache_data(self.pipeline_cache) }) else { return };
+        if let Err(error) = crate::files::replace(&path, &sealed(&self.pipeline_key, &data)) {
+            log::warn!("{}: the pipeline cache was not saved: {error}", path.display());
+        }
+    }
+
     /// Gives a Vulkan object the name that debuggers and the validation layer show.
     pub(super) fn name(&self, object: impl vk::Handle, name: &str) {
         let Some(names) = &self.names else { return };
@@ -205,6 +234,12 @@ impl Device {
         // SAFETY: the object belongs to this device and is alive. Names only serve debugging, so a failure is ignored.
         let _ = unsafe { names.set_debug_utils_object_name(&info) };
     }
+}
+
+/// What a device and its driver tell of the pipelines that they can read.
+fn pipeline_key(properties: &vk::PhysicalDeviceProperties) -> String {
+    let vk::PhysicalDeviceProperties { vendor_id, device_id, pipeline_cache_uuid, .. } = properties;
+    format!("{vendor_id:08x}{device_id:08x}{:032x}", u128::from_be_bytes(*pipeline_cache_uuid))
 }
 
 impl Drop for Device {

@@ -13,7 +13,6 @@ use std::ops::Range;
 
 /// Attachments of a render pass. A multisampled colour image is resolved into `resolve` if that is given.
 pub struct Target<'r> {
-    /// Colour attachment.
     pub color: &'r Image,
     /// Colour that it is cleared to; `None` keeps its content.
     pub clear: Option<[f32; 4]>,
@@ -93,7 +92,6 @@ impl<'r> Commands<'r> {
     }
 }
 
-/// Records draws inside a render pass.
 pub struct Drawing<'c, 'r> {
     commands: &'c mut Commands<'r>,
     pipeline: Option<&'r GraphicsPipeline>,
@@ -102,9 +100,6 @@ pub struct Drawing<'c, 'r> {
 impl<'r> Drawing<'_, 'r> {
     /// Selects the pipeline and its vertex buffers, in order of location, and the index buffer (32-bit). Both sides of
     /// triangles are drawn, until [`Drawing::cull`].
-    ///
-    /// # Panics
-    /// When the number of vertex buffers differs from the number of shader inputs.
     pub fn bind(&mut self, pipeline: &'r GraphicsPipeline, vertices: &[(&'r Buffer, u64)], indices: &'r Buffer) {
         assert_eq!(vertices.len(), pipeline.inputs.len(), "{}: vertex buffers against shader inputs", pipeline.name);
         let pass = self.commands.pass_name();
@@ -134,9 +129,6 @@ impl<'r> Drawing<'_, 'r> {
 
     /// Draws one triangle that covers the area, with a pipeline whose vertex shader makes it from `gl_VertexIndex`;
     /// `resources` are images that its fragment shader reads, at their binding numbers.
-    ///
-    /// # Panics
-    /// When resources or push constants are not what the shaders declare.
     pub fn screen<P: Pod>(&mut self, pipeline: &'r GraphicsPipeline, resources: &[Bind<'r>], push: &P) -> Result<()> {
         assert!(pipeline.inputs.is_empty(), "{}: makes its own vertices", pipeline.name);
         self.commands.bind(&pipeline.layout, &pipeline.name, vk::PipelineBindPoint::GRAPHICS, resources)?;
@@ -153,9 +145,6 @@ impl<'r> Drawing<'_, 'r> {
     }
 
     /// Binds images that the bound pipeline's fragment shader reads, at their binding numbers.
-    ///
-    /// # Panics
-    /// Before [`Drawing::bind`], and when resources are not what the shaders declare.
     pub fn resources(&mut self, resources: &[Bind<'r>]) -> Result<()> {
         let pipeline = self.pipeline.expect("a pipeline is bound before its resources");
         self.commands.bind(&pipeline.layout, &pipeline.name, vk::PipelineBindPoint::GRAPHICS, resources)
@@ -163,9 +152,6 @@ impl<'r> Drawing<'_, 'r> {
 
     /// Counts the samples that `record` draws, once a pass; its [`super::Timing`] holds the number. Nothing is counted
     /// without [`Commands::count_samples`] before, or by a device that cannot count exactly.
-    ///
-    /// # Panics
-    /// When a pass counts twice.
     pub fn counted(&mut self, record: impl FnOnce(&mut Self) -> Result<()>) -> Result<()> {
         let recording = &mut self.commands.recording;
         if recording.samples == vk::QueryPool::null() {
@@ -202,7 +188,6 @@ impl<'r> Drawing<'_, 'r> {
         self.clip([x, y, width, height]);
     }
 
-    /// Sets the scissor alone.
     pub fn clip(&mut self, [x, y, width, height]: [u32; 4]) {
         let scissor = vk::Rect2D {
             offset: vk::Offset2D { x: x.cast_signed(), y: y.cast_signed() },
@@ -214,9 +199,6 @@ impl<'r> Drawing<'_, 'r> {
     }
 
     /// Sets the bound pipeline's push constants.
-    ///
-    /// # Panics
-    /// Before [`Drawing::bind`].
     pub fn push<P: Pod>(&mut self, push: &P) {
         let pipeline = self.pipeline.expect("a pipeline is bound before its push constants");
         self.commands.push(&pipeline.layout, &pipeline.name, push);
@@ -224,9 +206,6 @@ impl<'r> Drawing<'_, 'r> {
 
     /// Draws the triangles of a range of corners, three a triangle, with a pipeline whose vertex shader finds corner
     /// `gl_VertexIndex` by itself.
-    ///
-    /// # Panics
-    /// Before [`Drawing::bind`].
     pub fn corners(&mut self, range: Range<u32>) {
         assert!(self.pipeline.is_some(), "a pipeline is bound before drawing");
         let (handle, buffer) = self.commands.raw();
@@ -235,9 +214,6 @@ impl<'r> Drawing<'_, 'r> {
     }
 
     /// Draws the triangles of a range of indices, three indices per triangle.
-    ///
-    /// # Panics
-    /// Before [`Drawing::bind`].
     pub fn indexed(&mut self, range: Range<u32>) {
         assert!(self.pipeline.is_some(), "a pipeline is bound before drawing");
         let (handle, buffer) = self.commands.raw();

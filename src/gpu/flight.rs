@@ -15,10 +15,8 @@ pub const FLIGHTS: usize = 2;
 /// Largest number of timed passes in one recording; each pass takes two timestamps.
 pub(super) const MAX_PASSES: u32 = 64;
 
-/// Duration of one pass on the device.
 #[derive(Clone, Debug)]
 pub struct Timing {
-    /// Name of the pass.
     pub pass: String,
     /// Milliseconds between the timestamps around it.
     pub milliseconds: f64,
@@ -26,7 +24,6 @@ pub struct Timing {
     pub samples: Option<u64>,
 }
 
-/// Semaphores around a submission.
 #[derive(Default)]
 pub(super) struct Signals {
     /// Colour attachments are written only after this is signalled.
@@ -118,8 +115,8 @@ impl Recording {
     }
 
     /// Submits; the caller must wait before it releases anything that the recording uses.
-    pub fn run(mut self, signals: Signals) -> Result<Flight> {
-        self.start(&signals)?;
+    pub fn run(mut self) -> Result<Flight> {
+        self.start(&Signals::default())?;
         Ok(Flight { recording: self, launched: false })
     }
 
@@ -195,9 +192,9 @@ impl Flight {
     pub fn wait(mut self) -> Result<Vec<Timing>> {
         let recording = &mut self.recording;
         recording.wait()?;
+        let flags = vk::QueryResultFlags::TYPE_64 | vk::QueryResultFlags::WAIT;
         let mut stamps = vec![0_u64; 2 * recording.passes.len()];
         if !stamps.is_empty() {
-            let flags = vk::QueryResultFlags::TYPE_64 | vk::QueryResultFlags::WAIT;
             // SAFETY: the pool is alive and has two stamps a pass.
             unsafe { recording.device.handle.get_query_pool_results(recording.queries, 0, &mut stamps, flags) }
                 .checked("vkGetQueryPoolResults", &recording.name)?;
@@ -213,7 +210,6 @@ impl Flight {
             .collect();
         for &pass in &recording.counted {
             let mut count = [0_u64];
-            let flags = vk::QueryResultFlags::TYPE_64 | vk::QueryResultFlags::WAIT;
             // SAFETY: the pool is alive, and the query was begun and ended in the recording.
             unsafe { recording.device.handle.get_query_pool_results(recording.samples, pass, &mut count, flags) }
                 .checked("vkGetQueryPoolResults", &recording.name)?;
@@ -256,7 +252,6 @@ impl Device {
         }
     }
 
-    /// The queue, locked for one user at a time.
     pub(super) fn queue(&self) -> MutexGuard<'_, vk::Queue> {
         self.queue.lock().unwrap_or_else(|poisoned| poisoned.into_inner())
     }

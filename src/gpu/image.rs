@@ -9,14 +9,10 @@ use std::any::Any;
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
 
-/// Format, size and sample count of an image.
 #[derive(Clone, Copy, Debug)]
 pub struct ImageShape {
-    /// Texel format.
     pub format: vk::Format,
-    /// Width in texels.
     pub width: u32,
-    /// Height in texels.
     pub height: u32,
     /// Samples per texel: 1 or 4.
     pub samples: u32,
@@ -48,11 +44,10 @@ impl Drop for ImageHandle {
 /// A two-dimensional image that passes draw into and read.
 pub struct Image {
     handle: ImageHandle,
-    memory: Option<Allocation>,
+    /// Freed after the handle; `None` for an image of a swapchain.
+    _memory: Option<Allocation>,
     levels: u32,
-    /// Format and size.
     pub shape: ImageShape,
-    /// Name shown in messages and debuggers.
     pub name: String,
     pub(super) id: u64,
 }
@@ -136,7 +131,7 @@ impl Image {
         handle.view = unsafe { device.handle.create_image_view(&view, None) }.checked("vkCreateImageView", name)?;
         device.name(handle.view, name);
         let id = device.next_resource.fetch_add(1, Ordering::Relaxed);
-        Ok(Image { handle, memory, levels, shape, name: name.to_owned(), id })
+        Ok(Image { handle, _memory: memory, levels, shape, name: name.to_owned(), id })
     }
 
     pub(super) fn raw(&self) -> vk::Image {
@@ -150,11 +145,6 @@ impl Image {
     /// All levels of its one layer.
     pub(super) fn whole(&self) -> vk::ImageSubresourceRange {
         whole(self.shape.format, self.levels)
-    }
-
-    /// Device memory, bytes; 0 for an image of a swapchain.
-    pub(super) fn memory_bytes(&self) -> u64 {
-        self.memory.as_ref().map_or(0, |memory| memory.size_bytes)
     }
 }
 

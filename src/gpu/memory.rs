@@ -22,17 +22,13 @@ pub enum BufferKind {
 
 impl BufferKind {
     /// Memory properties to try, best first.
-    pub(super) fn preferences(self) -> &'static [vk::MemoryPropertyFlags] {
+    pub(super) fn preferences(self) -> [vk::MemoryPropertyFlags; 2] {
         use vk::MemoryPropertyFlags as Flags;
-        const COHERENT: Flags = Flags::from_raw(Flags::HOST_VISIBLE.as_raw() | Flags::HOST_COHERENT.as_raw());
-        const UPLOAD: Flags = Flags::from_raw(COHERENT.as_raw() | Flags::DEVICE_LOCAL.as_raw());
-        const READBACK: Flags = Flags::from_raw(COHERENT.as_raw() | Flags::HOST_CACHED.as_raw());
-        const LISTS: [[vk::MemoryPropertyFlags; 2]; 3] =
-            [[Flags::DEVICE_LOCAL, Flags::empty()], [UPLOAD, COHERENT], [READBACK, COHERENT]];
+        let coherent = Flags::HOST_VISIBLE | Flags::HOST_COHERENT;
         match self {
-            BufferKind::Device => &LISTS[0],
-            BufferKind::Upload => &LISTS[1],
-            BufferKind::Readback => &LISTS[2],
+            BufferKind::Device => [Flags::DEVICE_LOCAL, Flags::empty()],
+            BufferKind::Upload => [coherent | Flags::DEVICE_LOCAL, coherent],
+            BufferKind::Readback => [coherent | Flags::HOST_CACHED, coherent],
         }
     }
 }
@@ -41,7 +37,7 @@ impl BufferKind {
 pub(super) struct Allocation {
     device: Arc<Device>,
     pub(super) handle: vk::DeviceMemory,
-    pub(super) size_bytes: u64,
+    size_bytes: u64,
     host_coherent: bool,
 }
 
@@ -50,7 +46,7 @@ impl Allocation {
         device: &Arc<Device>,
         name: &str,
         needs: vk::MemoryRequirements,
-        preferences: &[vk::MemoryPropertyFlags],
+        preferences: [vk::MemoryPropertyFlags; 2],
     ) -> Result<Self> {
         let types = device.memory.memory_types_as_slice();
         let allowed = |index: usize| needs.memory_type_bits & (1 << index) != 0;
@@ -71,6 +67,7 @@ impl Allocation {
         // SAFETY: size and type come from the device; freed in `Drop`.
         let handle = unsafe { device.handle.allocate_memory(&allocate, None) }.checked("vkAllocateMemory", name)?;
         device.name(handle, name);
+        device.allocated_bytes.fetch_add(needs.size, Ordering::Relaxed);
         let coherent = vk::MemoryPropertyFlags::HOST_VISIBLE | vk::MemoryPropertyFlags::HOST_COHERENT;
         let host_coherent = types[index].property_flags.contains(coherent);
         Ok(Allocation { device: device.clone(), handle, size_bytes: needs.size, host_coherent })
@@ -81,6 +78,7 @@ impl Drop for Allocation {
     fn drop(&mut self) {
         // SAFETY: the object bound to this memory is dropped first (field order of its owner).
         unsafe { self.device.handle.free_memory(self.handle, None) };
+        self.device.allocated_bytes.fetch_sub(self.size_bytes, Ordering::Relaxed);
     }
 }
 
@@ -88,7 +86,6 @@ impl Drop for Allocation {
 struct BufferHandle {
     device: Arc<Device>,
     buffer: vk::Buffer,
-    /// The texel views made so far.
     views: Mutex<Vec<(vk::Format, vk::BufferView)>>,
 }
 
@@ -113,9 +110,7 @@ pub struct Buffer {
     memory: Allocation,
     mapped: Option<*mut u8>,
     pub(super) kind: BufferKind,
-    /// Size in bytes.
     pub size_bytes: u64,
-    /// Name shown in messages and debuggers.
     pub name: String,
     pub(super) id: u64,
 }
@@ -197,9 +192,6 @@ impl Buffer {
 
     /// Writes `data` at a byte offset into mapped memory. The caller must not write what a recording in flight reads
     /// ([`Commands::launch`]); [`Upload`] keeps one buffer per flight for that.
-    ///
-    /// # Panics
-    /// When the buffer is not visible to the host or the data does not fit.
     pub fn write<T: Pod>(&mut self, offset_bytes: u64, data: &[T]) {
         let bytes: &[u8] = bytemuck::cast_slice(data);
         let pointer = self.mapped.unwrap_or_else(|| panic!("{} is not visible to the host", self.name));
@@ -210,9 +202,6 @@ impl Buffer {
     }
 
     /// Waits for all recordings in flight, then copies `count` elements from a byte offset of mapped memory.
-    ///
-    /// # Panics
-    /// When the buffer is not visible to the host or the range is outside it.
     pub fn read<T: Pod>(&self, offset_bytes: u64, count: usize) -> Vec<T> {
         self.device().settle();
         let pointer = self.mapped.unwrap_or_else(|| panic!("{} is not visible to the host", self.name));
@@ -243,7 +232,6 @@ impl Buffer {
         Ok(staging.read(0, size as usize / size_of::<T>()))
     }
 
-    /// The device that the buffer belongs to.
     pub fn device(&self) -> &Arc<Device> {
         &self.memory.device
     }
@@ -269,7 +257,6 @@ pub struct Upload {
 }
 
 impl Upload {
-    /// Buffers of `size_bytes` each.
     pub fn new(device: &Arc<Device>, name: &str, size_bytes: u64) -> Result<Self> {
         let one = || Buffer::new(device, name, BufferKind::Upload, size_bytes);
         Ok(Upload { buffers: [one()?, one()?], last: 0 })
@@ -286,11 +273,6 @@ impl Upload {
         }
         buffer.write(0, data);
         Ok(())
-    }
-
-    /// Bytes of all buffers together.
-    pub fn all_bytes(&self) -> u64 {
-        self.buffers.iter().map(|buffer| buffer.size_bytes).sum()
     }
 }
 
@@ -325,7 +307,6 @@ impl<'b> TexelView<'b> {
         size_bytes / Self::texel_bytes(format) <= u64::from(device.limits.max_texel_buffer_elements)
     }
 
-    /// A view of the whole of `buffer`.
     pub fn new(buffer: &'b Buffer, format: vk::Format) -> Result<Self> {
         let device = buffer.device();
         if !Self::fits(device, format, buffer.size_bytes) {

@@ -3,6 +3,9 @@
 //! It knows nothing of spherical harmonics, fields or scenes, and it holds all of the crate's `unsafe`. Every Vulkan
 //! object has one owner whose `Drop` destroys it; every owner keeps the [`Device`] alive.
 
+// All but `Gpu`, `DeviceOptions` and `Validation` stands below the front door.
+#![allow(missing_docs)]
+
 pub mod access;
 pub mod census;
 pub mod commands;
@@ -13,21 +16,16 @@ pub mod device;
 pub mod display;
 pub mod drawing;
 pub mod flight;
-pub mod heap;
 pub mod image;
 mod instance;
-mod limits;
 pub mod loader;
 pub mod memory;
 pub mod pipeline;
-mod pipeline_cache;
-#[cfg(feature = "view")]
-pub mod present;
+pub mod process;
 pub mod reflect;
 pub mod select;
 pub mod shader;
 pub mod share;
-pub mod signals;
 pub mod texture;
 pub mod validation;
 #[cfg(feature = "view")]
@@ -42,16 +40,14 @@ pub use flight::{FLIGHTS, Flight, Timing};
 pub use image::{Image, ImageShape};
 pub use memory::{Buffer, BufferKind, TexelView, Upload};
 pub use pipeline::{ComputePipeline, GraphicsPipeline, GraphicsState, Keeps};
-pub use select::{cores, share_cores};
+pub use process::{cores, share_cores};
 pub use shader::{Shader, Stage};
 pub use share::Gpu;
 pub use texture::Texture;
 pub use validation::Validation;
 
 #[cfg(feature = "view")]
-pub use present::PresentMode;
-#[cfg(feature = "view")]
-pub use window::{Shot, Window};
+pub use window::{PresentMode, Shot, Window};
 
 use crate::error::{Error, Result};
 use ash::vk;

@@ -1,11 +1,11 @@
 //! Pipelines and their layouts, built from the reflection of their shaders.
 
+use super::Checked;
 use super::compiling::Compiling;
 use super::device::Device;
-use super::reflect::{Binding, VertexInput};
+use super::reflect::{Binding, Reflection, VertexInput};
 use super::shader::{Shader, Stage};
-use super::{Checked, limits};
-use crate::error::Result;
+use crate::error::{Error, Result};
 use ash::vk;
 use std::sync::Arc;
 
@@ -28,7 +28,7 @@ impl Layout {
             }
         }
         bindings.sort_by_key(|b| b.index);
-        limits::check(&device.limits, name, shaders, &bindings)?;
+        check_limits(&device.limits, name, shaders, &bindings)?;
         let all_stages = shaders.iter().fold(vk::ShaderStageFlags::empty(), |all, s| all | stage_flag(s.stage));
         let descriptions: Vec<_> = bindings
             .iter()
@@ -67,6 +67,50 @@ impl Layout {
         device.name(layout.pipeline, name);
         Ok(layout)
     }
+}
+
+/// Compares what shaders ask for with the device's limits.
+fn check_limits(
+    limits: &vk::PhysicalDeviceLimits,
+    name: &str,
+    shaders: &[&Shader],
+    bindings: &[Binding],
+) -> Result<()> {
+    use vk::DescriptorType as Kind;
+    let push_bytes = shaders.iter().map(|s| s.reflection.push_bytes).max().unwrap_or(0);
+    at_most(name, "bytes of push constants", push_bytes, limits.max_push_constants_size)?;
+    let count = |kinds: &[Kind]| bindings.iter().filter(|b| kinds.contains(&b.kind)).count() as u32;
+    // A texel buffer counts as a sampled image.
+    let sampled = [Kind::UNIFORM_TEXEL_BUFFER, Kind::SAMPLED_IMAGE, Kind::COMBINED_IMAGE_SAMPLER];
+    for (what, asked, most) in [
+        ("storage buffers a stage", count(&[Kind::STORAGE_BUFFER]), limits.max_per_stage_descriptor_storage_buffers),
+        ("uniform buffers a stage", count(&[Kind::UNIFORM_BUFFER]), limits.max_per_stage_descriptor_uniform_buffers),
+        ("sampled images a stage", count(&sampled), limits.max_per_stage_descriptor_sampled_images),
+        ("resources a stage", bindings.len() as u32, limits.max_per_stage_resources),
+    ] {
+        at_most(name, what, asked, most)?;
+    }
+    shaders
+        .iter()
+        .filter(|shader| shader.stage == Stage::Compute)
+        .try_for_each(|shader| check_workgroup(limits, name, &shader.reflection))
+}
+
+fn check_workgroup(limits: &vk::PhysicalDeviceLimits, name: &str, shader: &Reflection) -> Result<()> {
+    let size = shader.local_size;
+    at_most(name, "invocations a workgroup", size.iter().product(), limits.max_compute_work_group_invocations)?;
+    for (axis, (asked, most)) in ["x", "y", "z"].iter().zip(size.iter().zip(limits.max_compute_work_group_size)) {
+        at_most(name, &format!("invocations a workgroup along {axis}"), *asked, most)?;
+    }
+    let shared = "bytes of memory shared by a workgroup";
+    at_most(name, shared, shader.shared_bytes, limits.max_compute_shared_memory_size)
+}
+
+fn at_most(name: &str, what: &str, asked: u32, most: u32) -> Result<()> {
+    if asked > most {
+        return Err(Error::Unsupported(format!("{name} wants {asked} {what}, the device takes {most}")));
+    }
+    Ok(())
 }
 
 impl Drop for Layout {
@@ -125,14 +169,11 @@ impl Drop for PipelineHandle {
 pub struct ComputePipeline {
     handle: PipelineHandle,
     pub(super) layout: Layout,
-    /// Workgroup size.
     pub local_size: [u32; 3],
-    /// Name of the pass.
     pub name: String,
 }
 
 impl ComputePipeline {
-    /// Builds the pipeline.
     pub fn new(device: &Arc<Device>, name: &str, shader: &Shader) -> Result<Self> {
         let layout = Layout::new(device, name, &[shader])?;
         let local_size = shader.reflection.local_size;
@@ -159,13 +200,11 @@ impl ComputePipeline {
 /// Which of the values that are drawn at a pixel it keeps, channel by channel.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Keeps {
-    /// The last.
     Last,
     /// The largest, also of what the attachment held before.
     Largest,
     /// The last over what was there before, by its alpha, with which its colour is premultiplied.
     Over,
-    /// Depth alone.
     Depth,
     /// As [`Keeps::Over`], of what is at least as near as its depth; alpha and depth stay what they were.
     ColorOver,
@@ -175,13 +214,10 @@ pub enum Keeps {
 /// front faces, and dynamic viewport, scissor and culling.
 #[derive(Clone, Copy, Debug)]
 pub struct GraphicsState {
-    /// Colour attachment format.
     pub color: vk::Format,
     /// Depth attachment format. If present, depth is tested and written, and greater is nearer (reversed depth).
     pub depth: Option<vk::Format>,
-    /// Samples per pixel.
     pub samples: u32,
-    /// Which value a pixel keeps of those that are drawn there.
     pub keeps: Keeps,
     /// How much nearer everything is drawn than it is, in steps of the largest depth of its triangle.
     pub nearer_steps: f32,
@@ -202,14 +238,11 @@ pub struct GraphicsPipeline {
     handle: PipelineHandle,
     pub(super) layout: Layout,
     pub(super) inputs: Vec<VertexInput>,
-    /// Fixed-function state.
     pub state: GraphicsState,
-    /// Name of the pass.
     pub name: String,
 }
 
 impl GraphicsPipeline {
-    /// Builds the pipeline.
     pub fn new(
         device: &Arc<Device>,
         name: &str,

@@ -3,8 +3,7 @@
 
 use crate::error::{Error, Result};
 use ash::vk;
-use rspirv::binary::{Consumer, ParseAction, ParseState, parse_words};
-use rspirv::dr::{Instruction, Loader, Module, ModuleHeader, Operand};
+use rspirv::dr::{Instruction, Module, Operand, load_words};
 use rspirv::spirv::{BuiltIn, Decoration, Dim, ExecutionMode, Op, StorageClass};
 use std::collections::{BTreeMap, HashMap};
 
@@ -17,16 +16,13 @@ pub struct Binding {
     pub name: String,
     /// Storage or uniform block, texel buffer, image (`texture2D`), or image with a sampler (`sampler2D`).
     pub kind: vk::DescriptorType,
-    /// Whether the shader may write it.
     pub writes: bool,
     /// Bytes of the fixed part of the block; 0 for texels and images.
     pub block_bytes: u32,
 }
 
-/// One vertex attribute.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct VertexInput {
-    /// `location`.
     pub location: u32,
     /// Number of floats, 1 to 4.
     pub components: u32,
@@ -35,7 +31,6 @@ pub struct VertexInput {
 /// Byte offsets of a struct's members, by name, in order of declaration.
 pub type StructLayout = Vec<(String, u32)>;
 
-/// The declarations of one module.
 #[derive(Clone, Debug, Default)]
 pub struct Reflection {
     /// Bindings that the optimised code still uses, by index.
@@ -44,7 +39,6 @@ pub struct Reflection {
     pub push_bytes: u32,
     /// Memory that the invocations of a workgroup share, bytes.
     pub shared_bytes: u32,
-    /// Workgroup size of a compute shader.
     pub local_size: [u32; 3],
     /// Vertex inputs by location; empty for other stages.
     pub inputs: Vec<VertexInput>,
@@ -55,38 +49,25 @@ pub struct Reflection {
 }
 
 impl Reflection {
-    /// Reads a module's declarations.
     pub fn new(spirv: &[u32]) -> Result<Self> {
-        let mut declarations = Declarations(Loader::new());
-        match parse_words(spirv, &mut declarations) {
-            Ok(()) | Err(ParseState::ConsumerStopRequested) => Reader::new(&declarations.0.module()).reflect(),
-            Err(error) => Err(Error::Failed(format!("unreadable SPIR-V: {error}"))),
-        }
+        let module =
+            load_words(declarations(spirv)).map_err(|error| Error::Failed(format!("unreadable SPIR-V: {error}")))?;
+        Reader::new(&module).reflect()
     }
 }
 
-/// Loads what stands before the first function, where all declarations are; functions are most of a module.
-struct Declarations(Loader);
-
-impl Consumer for Declarations {
-    fn initialize(&mut self) -> ParseAction {
-        self.0.initialize()
-    }
-
-    fn finalize(&mut self) -> ParseAction {
-        self.0.finalize()
-    }
-
-    fn consume_header(&mut self, header: ModuleHeader) -> ParseAction {
-        self.0.consume_header(header)
-    }
-
-    fn consume_instruction(&mut self, instruction: Instruction) -> ParseAction {
-        match instruction.class.opcode {
-            Op::Function => ParseAction::Stop,
-            _ => self.0.consume_instruction(instruction),
+/// What stands before the first function, where all declarations are; functions are most of a module.
+fn declarations(spirv: &[u32]) -> &[u32] {
+    const HEADER_WORDS: usize = 5;
+    let mut at = HEADER_WORDS;
+    while let Some(word) = spirv.get(at) {
+        let [word_count, opcode] = [word >> 16, word & 0xffff];
+        if opcode == Op::Function as u32 || word_count == 0 {
+            return &spirv[..at];
         }
+        at += word_count as usize;
     }
+    spirv
 }
 
 /// A module with indexes by id, for the queries below.
@@ -258,7 +239,6 @@ impl<'m> Reader<'m> {
         Ok(Binding { index, name, kind, writes, block_bytes })
     }
 
-    /// Components of a scalar or vector type.
     pub(super) fn components(&self, of: u32) -> u32 {
         match self.definitions[&of].class.opcode {
             Op::TypeVector => literal(self.definitions[&of].operands.get(1)),

@@ -4,16 +4,21 @@ use super::Checked;
 use crate::error::{Error, Result};
 use ash::vk;
 use std::ffi::CStr;
-use std::process::Command;
+
+/// Kinds of devices, the best first.
+const KINDS: [(vk::PhysicalDeviceType, &str); 4] = [
+    (vk::PhysicalDeviceType::DISCRETE_GPU, "discrete"),
+    (vk::PhysicalDeviceType::INTEGRATED_GPU, "integrated"),
+    (vk::PhysicalDeviceType::VIRTUAL_GPU, "virtual"),
+    (vk::PhysicalDeviceType::CPU, "cpu"),
+];
 
 /// One physical device, as `devices` prints it.
 #[derive(Clone, Debug)]
 pub struct Candidate {
     /// Position in the loader's list; `--device INDEX` names it.
     pub index: usize,
-    /// The driver's name of the device.
     pub name: String,
-    /// Kind of device.
     pub kind: vk::PhysicalDeviceType,
     /// Highest supported Vulkan version, as `major.minor.patch`.
     pub api: String,
@@ -38,25 +43,12 @@ impl Candidate {
         self.name.contains("SwiftShader")
     }
 
-    /// One word for the kind.
     pub fn kind_name(&self) -> &'static str {
-        match self.kind {
-            vk::PhysicalDeviceType::DISCRETE_GPU => "discrete",
-            vk::PhysicalDeviceType::INTEGRATED_GPU => "integrated",
-            vk::PhysicalDeviceType::VIRTUAL_GPU => "virtual",
-            vk::PhysicalDeviceType::CPU => "cpu",
-            _ => "other",
-        }
+        KINDS.iter().find(|(kind, _)| *kind == self.kind).map_or("other", |(_, name)| name)
     }
 
     fn rank(&self) -> usize {
-        match self.kind {
-            vk::PhysicalDeviceType::DISCRETE_GPU => 0,
-            vk::PhysicalDeviceType::INTEGRATED_GPU => 1,
-            vk::PhysicalDeviceType::VIRTUAL_GPU => 2,
-            vk::PhysicalDeviceType::CPU => 3,
-            _ => 4,
-        }
+        KINDS.iter().position(|(kind, _)| *kind == self.kind).unwrap_or(KINDS.len())
     }
 }
 
@@ -125,37 +117,35 @@ pub(super) fn physical_devices(instance: &ash::Instance) -> Result<Vec<(vk::Phys
     Ok(handles.into_iter().enumerate().map(|(index, handle)| (handle, describe(instance, index, handle))).collect())
 }
 
-/// Properties of one physical device.
 pub(super) fn describe(instance: &ash::Instance, index: usize, physical: vk::PhysicalDevice) -> Candidate {
-    // SAFETY: for the whole block, queries on live handles with structs that outlive the calls; the 1.3 structs are
-    // only chained if the device supports 1.3.
-    let (properties, unsuitable, counts_samples, identity, driver) = unsafe {
+    let mut identity = vk::PhysicalDeviceIDProperties::default();
+    let mut driver = vk::PhysicalDeviceDriverProperties::default();
+    let mut both = vk::PhysicalDeviceProperties2::default().push_next(&mut identity).push_next(&mut driver);
+    let mut core_1_3 = vk::PhysicalDeviceVulkan13Features::default();
+    let mut features = vk::PhysicalDeviceFeatures2::default().push_next(&mut core_1_3);
+    // SAFETY: for the whole block, queries on live handles with structs that outlive the calls; structs are only chained
+    // if the device supports their version.
+    let (properties, families) = unsafe {
         let properties = instance.get_physical_device_properties(physical);
-        let mut identity = vk::PhysicalDeviceIDProperties::default();
-        let mut driver = vk::PhysicalDeviceDriverProperties::default();
-        let mut both = vk::PhysicalDeviceProperties2::default().push_next(&mut identity).push_next(&mut driver);
         if properties.api_version >= vk::API_VERSION_1_2 {
             instance.get_physical_device_properties2(physical, &mut both);
         }
-        let mut unsuitable = None;
-        let mut counts_samples = false;
-        if properties.api_version < vk::API_VERSION_1_3 {
-            unsuitable = Some(format!("supports Vulkan {}, but 1.3 is needed", version_text(properties.api_version)));
-        } else {
-            let mut core_1_3 = vk::PhysicalDeviceVulkan13Features::default();
-            let mut features = vk::PhysicalDeviceFeatures2::default().push_next(&mut core_1_3);
+        if properties.api_version >= vk::API_VERSION_1_3 {
             instance.get_physical_device_features2(physical, &mut features);
-            counts_samples = features.features.occlusion_query_precise == vk::TRUE;
-            let families = instance.get_physical_device_queue_family_properties(physical);
-            let missing =
-                [(core_1_3.dynamic_rendering, "dynamicRendering"), (core_1_3.synchronization2, "synchronization2")];
-            if let Some((_, feature)) = missing.iter().find(|(present, _)| *present == vk::FALSE) {
-                unsuitable = Some(format!("lacks the feature {feature}"));
-            } else if queue_family(&families).is_none() {
-                unsuitable = Some("has no queue with graphics, compute and timestamps".into());
-            }
         }
-        (properties, unsuitable, counts_samples, identity, driver)
+        (properties, instance.get_physical_device_queue_family_properties(physical))
+    };
+    let counts_samples = features.features.occlusion_query_precise == vk::TRUE;
+    let unsuitable = if properties.api_version < vk::API_VERSION_1_3 {
+        Some(format!("supports Vulkan {}, but 1.3 is needed", version_text(properties.api_version)))
+    } else if core_1_3.dynamic_rendering == vk::FALSE {
+        Some("lacks the feature dynamicRendering".into())
+    } else if core_1_3.synchronization2 == vk::FALSE {
+        Some("lacks the feature synchronization2".into())
+    } else if queue_family(&families).is_none() {
+        Some("has no queue with graphics, compute and timestamps".into())
+    } else {
+        None
     };
     let text = |chars: &[std::ffi::c_char]| {
         let bytes: Vec<u8> = chars.iter().map(|&c| c.cast_unsigned()).collect();
@@ -177,21 +167,6 @@ pub(super) fn describe(instance: &ash::Instance, index: usize, physical: vk::Phy
         uuid: identity.device_uuid.iter().map(|byte| format!("{byte:02x}")).collect(),
         counts_samples,
         unsuitable,
-    }
-}
-
-/// Cores of this machine that the process may use.
-pub fn cores() -> usize {
-    std::thread::available_parallelism().map_or(1, |cores| cores.get())
-}
-
-/// Gives a new process, one of so many at a time, its share of the cores as threads of llvmpipe besides the one that
-/// asks for a drawing, unless the environment says how many. Where every core has a process, none: with a thread
-/// besides, two processes on two cores took 11.1 s for what they did in 10.3 s without.
-pub fn share_cores(command: &mut Command, processes: usize) {
-    if std::env::var_os("LP_NUM_THREADS").is_none() {
-        let threads = if processes >= cores() { 0 } else { cores() / processes };
-        command.env("LP_NUM_THREADS", threads.to_string());
     }
 }
 

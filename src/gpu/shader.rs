@@ -10,11 +10,8 @@ use std::sync::OnceLock;
 /// Pipeline stage of a shader, given by the file ending of its entry point.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Stage {
-    /// `.comp`
     Compute,
-    /// `.vert`
     Vertex,
-    /// `.frag`
     Fragment,
 }
 
@@ -32,11 +29,9 @@ impl Stage {
 pub struct ShaderSource<'a> {
     /// File name, for messages.
     pub name: &'a str,
-    /// Stage it is compiled for.
     pub stage: Stage,
     /// GLSL text of the entry point.
     pub text: String,
-    /// Macros, name and value.
     pub defines: &'a [(String, String)],
     /// Text of an included file by the name in the `#include` line.
     pub include: &'a dyn Fn(&str) -> Option<String>,
@@ -45,27 +40,24 @@ pub struct ShaderSource<'a> {
 /// Compiled code and its reflection.
 #[derive(Clone, Debug)]
 pub struct Shader {
-    /// File name of the entry point.
     pub name: String,
-    /// Stage it was compiled for.
     pub stage: Stage,
     /// SPIR-V 1.5 words.
     pub spirv: Vec<u32>,
-    /// Bindings, blocks, local size, constants.
     pub reflection: Reflection,
 }
-
-/// Deepest chain of includes.
-const INCLUDE_DEPTH: usize = 16;
 
 impl Shader {
     /// Compiles `source`, or reads the words from `cache_dir` if the same source, includes and defines were compiled by
     /// the same compiler before.
     pub fn compile(source: &ShaderSource<'_>, cache_dir: Option<&Path>) -> Result<Self> {
-        let includes = gather(source)?;
+        let includes = gather(source.name, &source.text, source.include)?;
         let key = key(source, &includes);
         let path = cache_dir.map(|folder| folder.join("spirv").join(format!("{key}.spv")));
-        let cached = path.as_ref().and_then(|path| crate::files::read(path).ok()).and_then(|bytes| words(&key, &bytes));
+        let file = path.as_ref().and_then(|path| crate::files::read(path).ok()).unwrap_or_default();
+        let cached = unsealed(&key, &file).filter(|bytes| bytes.len() % 4 == 0);
+        let word = |bytes: &[u8]| u32::from_ne_bytes(bytes.try_into().expect("four bytes"));
+        let cached = cached.map(|bytes| bytes.chunks_exact(4).map(word).collect());
         let shader = |spirv: Vec<u32>| -> Result<Self> {
             let reflection = Reflection::new(&spirv).map_err(|error| error.context(source.name))?;
             Ok(Shader { name: source.name.to_owned(), stage: source.stage, spirv, reflection })
@@ -86,37 +78,30 @@ impl Shader {
     }
 }
 
-/// Names in the `#include` lines of a text.
-pub fn included(text: &str) -> impl Iterator<Item = &str> {
-    text.lines().filter_map(|line| Some(line.trim_start().strip_prefix("#include")?.trim().trim_matches('"')))
-}
-
-/// Every file that the source includes, directly or indirectly, by name.
-fn gather(source: &ShaderSource<'_>) -> Result<BTreeMap<String, String>> {
+/// Every file that a text includes, directly or indirectly, by name; `include` gives the text of one.
+pub fn gather(name: &str, text: &str, include: &dyn Fn(&str) -> Option<String>) -> Result<BTreeMap<String, String>> {
     fn visit(
-        source: &ShaderSource<'_>,
         chain: &mut Vec<String>,
         text: &str,
+        include: &dyn Fn(&str) -> Option<String>,
         found: &mut BTreeMap<String, String>,
     ) -> Result<()> {
-        if chain.len() > INCLUDE_DEPTH {
-            return Err(Error::Failed(format!("includes nest deeper than {INCLUDE_DEPTH}: {}", chain.join(" > "))));
-        }
-        for name in included(text).map(str::to_owned) {
-            if found.contains_key(&name) {
+        let names = text.lines().filter_map(|line| line.trim_start().strip_prefix("#include"));
+        for name in names.map(|name| name.trim().trim_matches('"')) {
+            if found.contains_key(name) {
                 continue;
             }
-            let included = (source.include)(&name)
+            let included = include(name)
                 .ok_or_else(|| Error::Failed(format!("{}: there is no \"{name}\" to include", chain.join(" > "))))?;
-            chain.push(name.clone());
-            found.insert(name, included.clone());
-            visit(source, chain, &included, found)?;
+            chain.push(name.to_owned());
+            found.insert(name.to_owned(), included.clone());
+            visit(chain, &included, include, found)?;
             chain.pop();
         }
         Ok(())
     }
     let mut found = BTreeMap::new();
-    visit(source, &mut vec![source.name.to_owned()], &source.text, &mut found)?;
+    visit(&mut vec![name.to_owned()], text, include, &mut found)?;
     Ok(found)
 }
 
@@ -169,12 +154,6 @@ fn compile(source: &ShaderSource<'_>, includes: &BTreeMap<String, String>) -> Re
         .compile_into_spirv(&source.text, source.stage.kind(), source.name, "main", Some(&options))
         .map_err(|error| Error::Shader(format!("{}: {error}", source.name)))?;
     Ok(artifact.as_binary().to_vec())
-}
-
-/// The words of a cache file; `None` if it was not sealed with this key.
-pub fn words(key: &str, file: &[u8]) -> Option<Vec<u32>> {
-    let bytes = unsealed(key, file).filter(|bytes| bytes.len() % 4 == 0)?;
-    Some(bytes.chunks_exact(4).map(|b| u32::from_le_bytes(b.try_into().expect("four bytes"))).collect())
 }
 
 /// Content of a cache file: a hash of the key and the data, then the data. Neither a damaged file nor one that was

@@ -12,9 +12,7 @@ use std::sync::Arc;
 
 /// Texels of one level of detail; rows from the top.
 pub struct Level<'t> {
-    /// Width in texels.
     pub width: u32,
-    /// Height in texels.
     pub height: u32,
     /// Texels, as many as that, in the texture's format.
     pub bytes: &'t [u8],
@@ -36,8 +34,6 @@ impl Drop for Sampler {
 pub struct Texture {
     sampler: Sampler,
     image: Image,
-    /// Device memory, bytes.
-    pub size_bytes: u64,
 }
 
 impl Texture {
@@ -63,7 +59,7 @@ impl Texture {
         // SAFETY: destroyed by `Sampler`.
         let sampler = unsafe { device.handle.create_sampler(&sampler, None) }.checked("vkCreateSampler", name)?;
         let sampler = Sampler(device.clone(), sampler);
-        let texture = Texture { sampler, size_bytes: image.memory_bytes(), image };
+        let texture = Texture { sampler, image };
         texture.fill(device, name, levels)?;
         Ok(texture)
     }
@@ -89,7 +85,6 @@ impl Texture {
         commands.submit().map(|_| ())
     }
 
-    /// What a descriptor holds.
     pub(super) fn descriptor(&self) -> vk::DescriptorImageInfo {
         vk::DescriptorImageInfo {
             sampler: self.sampler.1,

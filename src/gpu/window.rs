@@ -2,8 +2,7 @@
 
 use super::device::{Device, DeviceOptions};
 use super::flight::{FLIGHTS, Flight, Signals};
-use super::image::{Image, ImageShape};
-use super::present::{PresentMode, best_format, extent};
+use super::image::{Image, ImageShape, encodes_srgb};
 use super::{Checked, Commands};
 use crate::error::{Error, Result};
 use ash::{khr, vk};
@@ -11,6 +10,31 @@ use clap::ValueEnum;
 use raw_window_handle::{HasDisplayHandle, HasWindowHandle, RawDisplayHandle};
 use std::ffi::CStr;
 use std::sync::Arc;
+
+/// When a finished frame is shown.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
+pub enum PresentMode {
+    /// At the display's next refresh, in order; every device supports it.
+    #[default]
+    Fifo,
+    /// As FIFO, but a late frame is shown at once.
+    FifoRelaxed,
+    /// At the next refresh; a newer frame replaces one that waits.
+    Mailbox,
+    /// At once, with tearing.
+    Immediate,
+}
+
+impl PresentMode {
+    fn raw(self) -> vk::PresentModeKHR {
+        match self {
+            PresentMode::Fifo => vk::PresentModeKHR::FIFO,
+            PresentMode::FifoRelaxed => vk::PresentModeKHR::FIFO_RELAXED,
+            PresentMode::Mailbox => vk::PresentModeKHR::MAILBOX,
+            PresentMode::Immediate => vk::PresentModeKHR::IMMEDIATE,
+        }
+    }
+}
 
 impl Device {
     /// As [`Device::new`], with the extensions that windows of a display need.
@@ -70,7 +94,6 @@ impl Drop for WindowSurface {
     }
 }
 
-/// A semaphore with its owner.
 struct Semaphore(Arc<Device>, vk::Semaphore);
 
 impl Semaphore {
@@ -114,7 +137,6 @@ impl Drop for SwapchainHandle {
     }
 }
 
-/// A swapchain of one size with its images.
 struct Swapchain {
     images: Vec<Arc<Image>>,
     /// Signalled when an image is drawn. There is one per image, because only acquiring the image again shows that its
@@ -150,8 +172,6 @@ pub struct Window {
     format: vk::SurfaceFormatKHR,
     mode: PresentMode,
     size: [u32; 2],
-    /// Swapchains made so far.
-    pub chain_count: usize,
     surface: WindowSurface,
 }
 
@@ -175,7 +195,8 @@ impl Window {
         let formats = formats.checked("vkGetPhysicalDeviceSurfaceFormatsKHR", "window")?;
         if !modes.contains(&mode.raw()) {
             let known = PresentMode::value_variants().iter().filter(|m| modes.contains(&m.raw()));
-            let known: Vec<_> = known.map(|mode| mode.name()).collect();
+            let known: Vec<_> =
+                known.filter_map(|mode| Some(mode.to_possible_value()?.get_name().to_owned())).collect();
             return Err(Error::Unsupported(format!(
                 "this display does not support the present mode; it supports {}",
                 known.join(", ")
@@ -190,7 +211,6 @@ impl Window {
             format: best_format(&formats)?,
             mode,
             size,
-            chain_count: 0,
             surface,
         })
     }
@@ -240,9 +260,6 @@ impl Window {
     /// Launches a recording that draws into the shot's image and leaves it as
     /// [`Access::Present`](super::Access::Present), and shows it. A swapchain that no longer fits is rebuilt by the
     /// next [`Window::acquire`]; if it fits so little that nothing is shown, the answer is false.
-    ///
-    /// # Panics
-    /// When the shot belongs to another swapchain, because [`Window::resize`] was called in between.
     pub fn present(&mut self, commands: Commands<'_>, shot: &Shot) -> Result<(Flight, bool)> {
         let chain = self.chain.as_ref().expect("a shot is presented before the window changes");
         assert!(Arc::ptr_eq(&chain.images[shot.index as usize], &shot.image), "a shot of another swapchain");
@@ -306,7 +323,6 @@ impl Window {
         let drawn = images.iter().map(|_| Semaphore::new(&self.device, "drawn")).collect::<Result<_>>()?;
         log::info!("swapchain of {width}x{height}, {} images, {:?}", images.len(), self.format.format);
         self.chain = Some(Swapchain { images, drawn, handle });
-        self.chain_count += 1;
         Ok(true)
     }
 }
@@ -315,5 +331,50 @@ impl Drop for Window {
     fn drop(&mut self) {
         self.device.settle(); // the semaphores are destroyed after this
         self.chain = None;
+    }
+}
+
+/// The swapchain's size in pixels: the surface's, or if it has none, the window's clamped to the surface's bounds.
+/// `None` if a side is 0.
+fn extent(can: &vk::SurfaceCapabilitiesKHR, size: [u32; 2]) -> Option<[u32; 2]> {
+    let least = can.min_image_extent;
+    let most = can.max_image_extent;
+    let own = can.current_extent;
+    let [width, height] = if own.width == u32::MAX { size } else { [own.width, own.height] };
+    if width == 0 || height == 0 || size.contains(&0) || most.width == 0 || most.height == 0 {
+        return None;
+    }
+    Some([width.clamp(least.width, most.width), height.clamp(least.height, most.height)])
+}
+
+/// An sRGB format if there is one, because the device then encodes and blends linearly; else an 8-bit format that the
+/// shader encodes for.
+fn best_format(formats: &[vk::SurfaceFormatKHR]) -> Result<vk::SurfaceFormatKHR> {
+    let plain = |f: &vk::SurfaceFormatKHR| matches!(f.format, vk::Format::B8G8R8A8_UNORM | vk::Format::R8G8B8A8_UNORM);
+    let shown = || formats.iter().filter(|f| f.color_space == vk::ColorSpaceKHR::SRGB_NONLINEAR);
+    let found = shown().find(|f| encodes_srgb(f.format)).or_else(|| shown().find(|f| plain(f)));
+    found.copied().ok_or_else(|| Error::Unsupported("this display has no 8-bit sRGB colours".into()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_window_without_pixels_has_no_swapchain() {
+        let most = vk::Extent2D { width: 4096, height: 4096 };
+        let own = |width, height| vk::SurfaceCapabilitiesKHR {
+            current_extent: vk::Extent2D { width, height },
+            max_image_extent: most,
+            ..Default::default()
+        };
+        assert_eq!(extent(&own(640, 480), [1, 1]), Some([640, 480]), "the surface's own size wins");
+        assert_eq!(
+            extent(&own(u32::MAX, u32::MAX), [800, 9000]),
+            Some([800, 4096]),
+            "the window's size is clamped to the surface's bounds"
+        );
+        assert_eq!(extent(&own(0, 0), [640, 480]), None);
+        assert_eq!(extent(&own(640, 480), [0, 0]), None, "minimised");
     }
 }

@@ -405,11 +405,6 @@ impl ClusterLists {
         }
         entries.into_iter().map(|entry| ListEntry::entities(entry)[0] as usize).collect()
     }
-
-    pub fn size_bytes(&self) -> u64 {
-        (self.clusters.len()
-            * (size_of::<layout::Cluster>() + size_of::<ClusterBounds>() + size_of::<TriangleRun>() + 1)) as u64
-    }
 }
 
 struct Moved<'b> {

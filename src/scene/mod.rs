@@ -281,7 +281,7 @@ impl Scene {
     }
 
     /// Puts all entities that were taken out back into their groups. Returns whether there were any.
-    #[cfg(feature = "cli")]
+    #[cfg(feature = "view")]
     pub(crate) fn rejoin(&mut self) -> bool {
         !std::mem::take(&mut self.loose).is_empty()
     }

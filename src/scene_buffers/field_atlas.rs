@@ -84,8 +84,3 @@ pub(super) fn field_atlas(
     fields.fill(volume_at, &payload)?;
     Ok(FieldAtlas { fields, slots, volume_first: (volume_at / ALIGNMENT) as u32 })
 }
-
-/// A copy of one field in host memory.
-pub(super) fn download(fields: &Buffer, slot: &FieldSlot) -> Result<ShadowField> {
-    Ok(ShadowField { header: slot.header.clone(), payload: fields.download_range(slot.bytes.clone())? })
-}

@@ -31,7 +31,6 @@ use glam::DVec3;
 pub use silhouettes::{ColorsSlot, SilhouetteSlot, Silhouettes};
 use std::ops::Range;
 use std::sync::Arc;
-use textures::Content;
 
 /// A mesh of the scene as it shades and shines: its fields.
 pub struct DeviceMesh {
@@ -80,14 +79,12 @@ impl DeviceMesh {
     }
 }
 
-/// The data of a scene on the device.
 pub struct SceneBuffers {
     pub fields: Buffer,
     pub silhouettes: Silhouettes,
     /// Cells of self-visibility, [`self_visibility::CELLS`] of two words a vertex of the lit meshes that can shadow
     /// themselves.
     pub self_cells: Buffer,
-    /// Transfer vectors of all receivers' meshes.
     pub transfers: Buffer,
     /// Positions and normals of all meshes, one quad for each.
     pub vertices: Buffer,
@@ -99,7 +96,6 @@ pub struct SceneBuffers {
     pub surfaces: Vec<DeviceSurface>,
     /// The scene's textures; those that are equal are shared.
     pub textures: Vec<Arc<Texture>>,
-    /// The surface of each entity.
     surface_of: Vec<usize>,
     /// The bakes that were not found in the cache.
     pub baked: Vec<Baked>,
@@ -219,8 +215,7 @@ impl SceneBuffers {
             surfaces,
             textures: textures::upload(device, &scene.textures, |index| {
                 let is_number = |maps: MapIndices| maps.gloss == Some(index) || maps.normal == Some(index);
-                let any = scene.entities.iter().any(|entity| is_number(entity.maps));
-                if any { Content::Numbers } else { Content::Colors }
+                scene.entities.iter().any(|entity| is_number(entity.maps))
             })?,
             surface_of: baked.surface_of,
             baked: baked.baked,
@@ -236,7 +231,6 @@ impl SceneBuffers {
         Some([nodes.low.extend(1.0 / nodes.step_m).to_array(), counts.to_array()])
     }
 
-    /// Whether any surface has maps of self-visibility.
     pub fn has_self_shadows(&self) -> bool {
         self.surfaces.iter().any(|surface| surface.self_first != NONE)
     }
@@ -247,13 +241,6 @@ impl SceneBuffers {
         blocked.as_ref().is_some_and(|slot| slot.extent != Extent::Nothing)
     }
 
-    /// Device memory of all textures, bytes.
-    pub fn texture_bytes(&self) -> u64 {
-        let is_first = |i: &usize| !self.textures[..*i].iter().any(|other| Arc::ptr_eq(other, &self.textures[*i]));
-        (0..self.textures.len()).filter(is_first).map(|i| self.textures[i].size_bytes).sum()
-    }
-
-    /// The surface of an entity.
     pub fn surface(&self, entity: usize) -> &DeviceSurface {
         &self.surfaces[self.surface_of[entity]]
     }
@@ -277,7 +264,8 @@ impl SceneBuffers {
 
     /// A copy of one field in host memory, for the CPU twin.
     pub fn field(&self, slot: &FieldSlot) -> Result<ShadowField> {
-        field_atlas::download(&self.fields, slot)
+        let payload = self.fields.download_range(slot.bytes.clone())?;
+        Ok(ShadowField { header: slot.header.clone(), payload })
     }
 
     /// A copy of a surface's transfer vectors, in the mesh's order of vertices, and the floats of each.

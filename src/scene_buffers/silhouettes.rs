@@ -68,8 +68,4 @@ impl Silhouettes {
         let nodes = Buffer::with_data(device, "silhouette nodes", &nodes)?;
         Ok((Silhouettes { nodes, cells: Buffer::with_data(device, "silhouette cells", &cells)? }, slots))
     }
-
-    pub fn size_bytes(&self) -> u64 {
-        self.nodes.size_bytes + self.cells.size_bytes
-    }
 }

@@ -1,11 +1,5 @@
 //! Commands of the user and their effects.
 
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Panel {
-    Keys,
-    Figures,
-}
-
 /// A command. Positions and distances in the picture are in pixels, x to the right, y down; [`Command::Resize`] sets
 /// its size.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -42,7 +36,7 @@ pub enum Command {
     ToggleOverlay,
     /// Folds or unfolds the list of keys; shows all panels with it where they are hidden.
     ToggleKeys,
-    Fold(Panel, bool),
+    ShowFigures(bool),
     /// Slider: angle of the distant light, degrees.
     SetSkyTurn(f32),
     /// Slider: strength of the distant light.
@@ -54,11 +48,8 @@ pub enum Command {
     SetExposure(f32),
     /// Ends the movement of a slider, so that one undo reverts all of it.
     EndSlide,
-    /// Merge variant by name (see [`crate::merge::variant::VARIANTS`]); `None` is the device's fastest.
-    SetVariant(Option<&'static str>),
     Screenshot,
     Save,
-    /// Closes the window.
     Quit,
 }
 
@@ -73,7 +64,7 @@ pub struct Changed {
     pub placements: bool,
     /// Emission of entities: merge again.
     pub emission: bool,
-    /// Switches of entities: merge again, after a bake if fields are missing ([`Editor::needs`](super::Editor::needs)).
+    /// Switches of entities: merge again, after a bake if fields are missing.
     pub roles: bool,
     /// The distant light: update its coefficients and the background, merge again.
     pub sky: bool,
@@ -83,8 +74,6 @@ pub struct Changed {
     pub selection: bool,
     /// Overlay, reference, error or running: draw again.
     pub display: bool,
-    /// Merge variant: merge again.
-    pub variant: bool,
 }
 
 impl Changed {
@@ -93,7 +82,6 @@ impl Changed {
         self.scene || self.placements || self.emission || self.roles || self.sky
     }
 
-    /// Whether anything changed.
     pub fn any(&self) -> bool {
         *self != Changed::default()
     }
@@ -110,7 +98,6 @@ impl std::ops::BitOrAssign for Changed {
         self.exposure |= other.exposure;
         self.selection |= other.selection;
         self.display |= other.display;
-        self.variant |= other.variant;
     }
 }
 
@@ -119,6 +106,13 @@ pub struct Effect {
     pub changed: Changed,
     /// One line for the user, if nothing happened or the effect is not visible.
     pub message: Option<String>,
+}
+
+impl Effect {
+    /// Nothing changed, and a line says why.
+    pub(super) fn said(message: impl Into<String>) -> Self {
+        Effect { message: Some(message.into()), ..Effect::default() }
+    }
 }
 
 impl From<Changed> for Effect {

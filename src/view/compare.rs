@@ -2,7 +2,7 @@
 //! changes; and the error of the merge against it.
 
 use super::command::Changed;
-use super::status::ErrorScale;
+use super::panel::ErrorScale;
 use super::task::{BackgroundTask, TaskWorker};
 use super::viewer::{ERROR, REFERENCE, Viewer};
 use crate::asset::false_color::NEUTRAL;
@@ -18,7 +18,6 @@ const RUNS: u32 = 4;
 /// Number of vertices between two checks whether to stop.
 const CHUNK: usize = 512;
 
-/// The result of a round.
 pub(super) struct Reference {
     /// Version of the light for which it was cast, as the caller counts versions.
     pub(super) version: u64,
@@ -51,10 +50,7 @@ impl Viewer {
         // move.
         let known = self.reference.as_ref().map(|r| r.version);
         let stale = self.rays_version != self.version && known == Some(self.rays_version);
-        if (self.rays.is_none() && !current)
-            || stale
-            || (!current && !self.rays.as_ref().is_some_and(BackgroundTask::is_running))
-        {
+        if stale || (!current && !self.rays.as_ref().is_some_and(BackgroundTask::is_running)) {
             let scene = self.editor.scene().clone();
             let placements = self.editor.placements();
             self.rays = Some(cast(scene, placements, self.version, self.setup.seed));
@@ -69,15 +65,9 @@ impl Viewer {
     /// Computes the error's colours for the last merge, unless they are known.
     pub(super) fn compare(&mut self) -> Result<()> {
         let (Some(frame), Some(reference)) = (&mut self.frame, &self.reference) else { return Ok(()) };
-        if frame.stale_count() > 0 {
-            // Some clusters are out of date; the next frame merges them.
-            return Ok(());
-        }
-        if self
-            .error_shown
-            .as_ref()
-            .is_some_and(|(version, rays, _)| (*version, *rays) == (self.version, reference.rays))
-        {
+        let known = self.error_shown.map(|(version, rays, _)| (version, rays));
+        // Where some clusters are out of date, the next frame merges them.
+        if frame.stale_count() > 0 || known == Some((self.version, reference.rays)) {
             return Ok(());
         }
         let map = ErrorMap::new(&error_map::radiosity(frame)?, &reference.radiosity);
@@ -90,7 +80,6 @@ impl Viewer {
     }
 }
 
-/// Starts casting for the current state of a scene.
 fn cast(scene: Scene, placements: Vec<Placement>, version: u64, seed: u64) -> BackgroundTask<Reference> {
     BackgroundTask::new(move |worker: &TaskWorker<Reference>| {
         let shapes = RayMeshes::new(&scene);

@@ -1,9 +1,235 @@
-//! A move of one entity at all times: its whole motion moves with it. And what is moved with it.
+//! Changes of the scene, all of which can be undone.
 
+use super::command::{Changed, Command, Effect};
+use super::editor::Editor;
+use crate::asset::environment::EnvironmentData;
 use crate::scene::data::{Data, EntityData, MeshData};
 use crate::scene::motion::{Motion, Node};
 use crate::scene::values::POSITION_LIMIT_M;
 use glam::{DQuat, DVec3, Vec3};
+
+/// Largest number of changes that are kept.
+pub const STEP_LIMIT: usize = 256;
+/// Largest number of entities that all changes together keep: at least 100 MB.
+const ENTITY_LIMIT: usize = 1 << 18;
+
+/// The parts of a scene that a change concerns, at one time.
+#[derive(Default)]
+pub(super) struct Snapshot {
+    pub entities: Vec<(usize, EntityData)>,
+    /// Distant light.
+    pub environment: Option<EnvironmentData>,
+    pub exposure_ev: Option<f32>,
+}
+
+/// Kind of a change. Consecutive changes of the same kind may be undone as one.
+#[derive(Clone, Copy, PartialEq)]
+pub(super) enum EditKind {
+    Drag,
+    /// Change between occluder and light.
+    Role,
+    /// Angle of the distant light.
+    SkyTurn,
+    /// Strength of the distant light.
+    Sky,
+    Light,
+    Exposure,
+}
+
+/// The changes that can be undone and redone.
+#[derive(Default)]
+pub(super) struct History {
+    done: Vec<Snapshot>,
+    undone: Vec<Snapshot>,
+    /// Kind and selection of the last change, while further changes of this kind may join it.
+    open: Option<(EditKind, Option<usize>)>,
+}
+
+impl History {
+    /// Notes that a change of `kind` follows; `before` makes a snapshot of what it will change. If `joins`, and the
+    /// last change had the same kind and selection, the change becomes part of the last one.
+    pub fn note(&mut self, kind: EditKind, selection: Option<usize>, joins: bool, before: impl FnOnce() -> Snapshot) {
+        if joins && self.open == Some((kind, selection)) {
+            return;
+        }
+        self.open = Some((kind, selection));
+        self.undone.clear();
+        self.done.push(before());
+        let held = |steps: &[Snapshot]| steps.iter().map(|s| s.entities.len()).sum::<usize>();
+        while self.done.len() > STEP_LIMIT || (self.done.len() > 1 && held(&self.done) > ENTITY_LIMIT) {
+            self.done.remove(0);
+        }
+    }
+
+    /// Ends the last change, so that no further change joins it.
+    pub fn close(&mut self) {
+        self.open = None;
+    }
+
+    /// Undoes the last change, or redoes the one that was undone last: `swap` restores a snapshot and returns the
+    /// replaced state. Returns whether there was one.
+    pub fn travel(&mut self, forth: bool, swap: impl FnOnce(Snapshot) -> Snapshot) -> bool {
+        self.open = None;
+        let (from, to) = if forth { (&mut self.undone, &mut self.done) } else { (&mut self.done, &mut self.undone) };
+        let Some(snapshot) = from.pop() else { return false };
+        to.push(swap(snapshot));
+        true
+    }
+
+    pub fn undo_count(&self) -> usize {
+        self.done.len()
+    }
+}
+
+impl Editor {
+    pub(super) fn change(&mut self, command: Command) -> Effect {
+        self.drag = None;
+        match command {
+            Command::ToggleLight => self.toggle_light(),
+            Command::Undo => self.travel(false),
+            Command::Redo => self.travel(true),
+            Command::SetSkyTurn(turn_deg) => {
+                self.set_environment(EditKind::SkyTurn, |e| e.turn_deg = wrapped(turn_deg))
+            }
+            Command::SetSky(strength) => self.set_environment(EditKind::Sky, |e| e.strength = strength),
+            Command::SetLight(ev) => self.set_light(ev),
+            Command::SetExposure(ev) => self.set_exposure(ev),
+            _ => Effect::default(),
+        }
+    }
+
+    fn toggle_light(&mut self) -> Effect {
+        let Some(index) = self.selection else {
+            return Effect::said("select an entity first: click it, or Q / A");
+        };
+        self.note_entities(EditKind::Role, false, &[index]);
+        let mut data = self.scene.data.entities[index].clone();
+        if self.scene.entities[index].emits {
+            self.former_emission[index] = Some(data.emission).filter(|e| *e != Vec3::ZERO);
+            (data.emits, data.occludes, data.emission) = (Some(false), Some(true), Vec3::ZERO);
+        } else {
+            if data.emission == Vec3::ZERO {
+                data.emission = self.former_emission[index].unwrap_or_else(|| self.fitting_emission(index));
+            }
+            (data.emits, data.occludes) = (Some(true), Some(false));
+        }
+        self.scene.put_entity(index, data);
+        Changed { emission: true, roles: true, ..Changed::default() }.into()
+    }
+
+    /// Emission in the entity's colour that lights a white surface at the distance of the scene's size to a radiance of
+    /// about 1: a Lambertian sphere of radius r gives the irradiance pi L (r / d)^2 at distance d.
+    fn fitting_emission(&self, index: usize) -> Vec3 {
+        let (_, radius_m) = self.sphere(index, &self.placements()[index]);
+        let (_, distance_m) = self.bounds();
+        let white = self.white();
+        let needed = f64::from(white) * (distance_m / radius_m).powi(2);
+        let hue = self.scene.entities[index].albedo.max(Vec3::splat(0.02));
+        hue / hue.max_element() * (needed.clamp(1.0, 1e4) as f32)
+    }
+
+    /// Emission that [`Command::SetLight`] changes, in stops: the largest channel of the lights concerned; `None` if
+    /// there are none.
+    pub fn light_ev(&self) -> Option<f32> {
+        let lights = self.lights();
+        let largest = lights.iter().map(|i| self.scene.entities[*i].emission.max_element()).fold(0.0, f32::max);
+        (largest > 0.0).then(|| largest.log2())
+    }
+
+    /// The selected entity if it emits; all emitting entities if nothing is selected.
+    fn lights(&self) -> Vec<usize> {
+        let concerned = |i: &usize| self.scene.entities[*i].emits && self.selection.is_none_or(|s| s == *i);
+        (0..self.scene.data.entities.len()).filter(concerned).collect()
+    }
+
+    fn set_light(&mut self, ev: f32) -> Effect {
+        let Some(now) = self.light_ev().filter(|_| (-16.0..=32.0).contains(&ev)) else { return Effect::default() };
+        let lights = self.lights();
+        let factor = (ev - now).exp2();
+        self.note_entities(EditKind::Light, true, &lights);
+        for index in lights {
+            let mut data = self.scene.data.entities[index].clone();
+            data.emission *= factor;
+            self.scene.put_entity(index, data);
+        }
+        Changed { emission: true, ..Changed::default() }.into()
+    }
+
+    fn set_exposure(&mut self, ev: f32) -> Effect {
+        if !(-32.0..=32.0).contains(&ev) || ev == self.exposure_ev() {
+            return Effect::default();
+        }
+        let before = Snapshot { exposure_ev: Some(self.exposure_ev()), ..Snapshot::default() };
+        self.history.note(EditKind::Exposure, None, true, || before);
+        self.scene.data.output.exposure_ev = Some(ev);
+        Changed { exposure: true, ..Changed::default() }.into()
+    }
+
+    fn set_environment(&mut self, kind: EditKind, change: impl FnOnce(&mut EnvironmentData)) -> Effect {
+        let before = self.scene.data.environment.clone();
+        let mut after = before.clone();
+        change(&mut after);
+        if after == before {
+            return Effect::default();
+        }
+        if let Err(error) = self.scene.set_environment(&after) {
+            return Effect::said(error.to_string());
+        }
+        let before = Snapshot { environment: Some(before), ..Snapshot::default() };
+        self.history.note(kind, None, true, || before);
+        Changed { sky: true, ..Changed::default() }.into()
+    }
+
+    fn note_entities(&mut self, kind: EditKind, joins: bool, entities: &[usize]) {
+        let data = &self.scene.data.entities;
+        self.history.note(kind, self.selection, joins, || Snapshot {
+            entities: entities.iter().map(|&i| (i, data[i].clone())).collect(),
+            ..Snapshot::default()
+        });
+    }
+
+    fn travel(&mut self, forth: bool) -> Effect {
+        let mut changed = Changed::default();
+        let scene = &mut self.scene;
+        let swap = |snapshot: Snapshot| {
+            let mut back = Snapshot::default();
+            for (index, data) in snapshot.entities {
+                back.entities.push((index, scene.data.entities[index].clone()));
+                let before = scene.entities[index].clone();
+                scene.put_entity(index, data);
+                let after = &scene.entities[index];
+                changed.roles |= (before.emits, before.occludes) != (after.emits, after.occludes);
+                changed.emission |= before.emission != after.emission;
+                changed.placements = true;
+            }
+            if let Some(source) = snapshot.environment {
+                back.environment = Some(scene.data.environment.clone());
+                // The scene had this environment before, with the same picture.
+                changed.sky = scene.set_environment(&source).is_ok();
+            }
+            if let Some(ev) = snapshot.exposure_ev {
+                back.exposure_ev = Some(scene.data.output.exposure_ev());
+                scene.data.output.exposure_ev = Some(ev);
+                changed.exposure = true;
+            }
+            back
+        };
+        let found = self.history.travel(forth, swap);
+        if !found
+            && !forth
+            && let Some(effect) = self.return_to_former()
+        {
+            return effect;
+        }
+        let message = (!found).then(|| format!("nothing to {}", if forth { "redo" } else { "undo" }));
+        Effect { changed, message }
+    }
+}
+
+/// An angle within -180 to 180 degrees.
+fn wrapped(angle_deg: f32) -> f32 {
+    (angle_deg + 180.0).rem_euclid(360.0) - 180.0
+}
 
 /// The entity moved by `by` metres at all times; `None` if that leaves the range of a scene file.
 pub fn moved(entity: &EntityData, by: DVec3) -> Option<EntityData> {

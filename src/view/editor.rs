@@ -1,26 +1,16 @@
 //! The state of the editor behind the window.
 
-use super::command::{Changed, Command, Effect, Panel};
-use super::history::History;
+use super::command::{Changed, Command, Effect};
+use super::edit::History;
 use super::orbit_camera::OrbitCamera;
 use super::pick::{EntityDrag, Shapes, unbuilt_shapes};
 use crate::asset::enclose::around_spheres;
 use crate::asset::environment::EnvironmentData;
 use crate::asset::sky::Sky;
-use crate::bake;
-use crate::field::quantity;
-use crate::scene::groups::Groups;
 use crate::scene::{Camera, Data, Entity, Placement, Scene, framing};
 use glam::{DVec3, Vec3};
 use std::collections::HashSet;
 use std::path::{Path, PathBuf};
-
-#[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Panels {
-    pub(super) keys: bool,
-    /// The figures; `None` where the user has not chosen.
-    pub(super) figures: Option<bool>,
-}
 
 /// The state that `view` shows and that commands change.
 pub struct Editor {
@@ -31,16 +21,16 @@ pub struct Editor {
     /// The selected entity; `None` if none is selected.
     pub selection: Option<usize>,
     pub time_s: f64,
-    /// Whether the motion runs.
     pub running: bool,
     /// Whether the ray-cast reference is shown beside the merged picture.
     pub reference: bool,
     /// Whether the error is shown in false colour.
     pub error: bool,
-    /// Whether the overlay is shown.
     pub overlay: bool,
-    pub(super) panels: Panels,
-    variant: Option<&'static str>,
+    /// Whether the list of keys is unfolded.
+    pub(super) shows_keys: bool,
+    /// Whether the figures are unfolded; `None` where the user has not chosen.
+    pub(super) shows_figures: Option<bool>,
     pub(super) history: History,
     /// Emission of each entity before it stopped being a light.
     pub(super) former_emission: Vec<Option<Vec3>>,
@@ -79,8 +69,8 @@ impl Editor {
             reference: false,
             error: false,
             overlay: true,
-            panels: Panels::default(),
-            variant: None,
+            shows_keys: false,
+            shows_figures: None,
             history: History::default(),
             former_emission: vec![None; scene.entities.len()],
             shapes: unbuilt_shapes(&scene),
@@ -105,17 +95,12 @@ impl Editor {
         &self.scene.data.camera
     }
 
-    /// Current placements of the entities, in order.
     pub fn placements(&self) -> Vec<Placement> {
         self.scene.at(self.time_s)
     }
 
     pub fn size(&self) -> [u32; 2] {
         self.size
-    }
-
-    pub fn variant(&self) -> Option<&'static str> {
-        self.variant
     }
 
     /// Radiance that the exposure shows as white.
@@ -138,11 +123,6 @@ impl Editor {
 
     pub fn undo_count(&self) -> usize {
         self.history.undo_count()
-    }
-
-    /// Fields that a mesh needs for its entities' switches: occlusion, radiance.
-    pub fn needs(&self, mesh: usize) -> [Option<quantity::FieldKind>; 2] {
-        bake::needs(&self.scene, mesh, crate::scene::Lights::Sh, &Groups::alone(&self.scene)).fields
     }
 
     /// Advances the time by `dt_s` seconds if the motion runs. Placements depend only on the sum of all `dt_s`.
@@ -178,31 +158,30 @@ impl Editor {
             Command::SelectNext => self.cycle(1),
             Command::SelectPrevious => self.cycle(-1),
             Command::SelectNone => self.select(None),
-            Command::Pick(_) | Command::DragStart(_) | Command::DragTo(_) | Command::DragEnd => self.point(command),
+            Command::Pick(at) => {
+                let seen = self.hit(at).map(|(entity, _)| entity);
+                self.select(seen)
+            }
+            Command::DragStart(at) => self.grab(at),
+            Command::DragTo(at) => self.drag_to(at),
+            Command::DragEnd => self.let_go(),
             Command::NextScene => self.next_scene(),
             Command::ToggleRunning => toggle(&mut self.running),
             Command::ToggleReference => toggle(&mut self.reference),
             Command::ToggleError => toggle(&mut self.error),
             Command::ToggleOverlay => toggle(&mut self.overlay),
             Command::ToggleKeys => {
-                self.panels.keys = !(self.panels.keys && self.overlay);
+                self.shows_keys = !(self.shows_keys && self.overlay);
                 self.overlay = true;
                 Changed { display: true, ..unchanged }.into()
             }
-            Command::Fold(panel, folds) => {
-                match panel {
-                    Panel::Keys => self.panels.keys = !folds,
-                    Panel::Figures => self.panels.figures = Some(!folds),
-                }
+            Command::ShowFigures(shows) => {
+                self.shows_figures = Some(shows);
                 Changed { display: true, ..unchanged }.into()
             }
             Command::EndSlide => {
                 self.history.close();
                 Effect::default()
-            }
-            Command::SetVariant(name) => {
-                self.variant = name;
-                Changed { variant: true, ..unchanged }.into()
             }
             // The window's own.
             Command::Screenshot | Command::Save | Command::Quit => Effect::default(),
@@ -270,8 +249,8 @@ impl Editor {
             reference: self.reference,
             error: self.error,
             overlay: self.overlay,
-            panels: self.panels,
-            variant: self.variant,
+            shows_keys: self.shows_keys,
+            shows_figures: self.shows_figures,
             saved: self.saved.clone(),
             ..next
         };

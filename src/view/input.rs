@@ -129,7 +129,6 @@ struct PointerDrag {
     moved: bool,
 }
 
-/// Turns events into commands.
 #[derive(Debug)]
 pub struct Input {
     drag: Option<PointerDrag>,
@@ -147,7 +146,6 @@ impl Input {
         self.drag.is_some()
     }
 
-    /// The commands of an event, in order.
     pub fn commands(&mut self, event: Event, editor: &Editor) -> Vec<Command> {
         match event {
             Event::Key { key, control, repeat } => of_key(key, control, repeat).into_iter().collect(),

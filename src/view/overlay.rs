@@ -46,7 +46,6 @@ struct Run {
     indices: Range<u32>,
 }
 
-/// The pipeline, textures, and what the next recording draws.
 pub struct Overlay {
     device: Arc<Device>,
     pipeline: GraphicsPipeline,
@@ -89,7 +88,6 @@ impl Overlay {
         })
     }
 
-    /// Compiles its shaders again.
     pub fn reload(&mut self, library: &Library) -> Result<()> {
         self.pipeline = pipeline(&self.device, library, self.pipeline.state.color)?;
         Ok(())

@@ -1,9 +1,8 @@
 //! Picking and dragging: rays from the picture into the scene.
 
-use super::command::{Changed, Command, Effect};
-use super::edit;
+use super::command::{Changed, Effect};
+use super::edit::{self, EditKind, Snapshot};
 use super::editor::Editor;
-use super::history::{EditKind, Snapshot};
 use crate::draw::camera::through_pixels;
 use crate::scene::{EntityData, Placement, Scene};
 use crate::truth::ray_mesh::RayMesh;
@@ -93,36 +92,27 @@ impl Editor {
         })
     }
 
-    pub(super) fn point(&mut self, command: Command) -> Effect {
-        match command {
-            Command::Pick(at) => {
-                let seen = self.hit(at).map(|(entity, _)| entity);
-                self.select(seen)
-            }
-            Command::DragStart(at) => {
-                self.drag = None;
-                if self.grabs(at)
-                    && let Some((entity, anchor)) = self.hit(at)
-                {
-                    let data = &self.scene.data;
-                    let before =
-                        edit::pieces(data, entity).into_iter().map(|piece| (piece, data.entities[piece].clone()));
-                    self.drag = Some(EntityDrag { before: before.collect(), anchor, moved: false });
-                }
-                Effect::default()
-            }
-            Command::DragTo(at) => self.drag_to(at),
-            _ => {
-                let moved = self.drag.take().is_some_and(|drag| drag.moved);
-                self.history.close();
-                // Back among what rests: the group is baked anew while the picture goes on by fields.
-                let regrouped = moved && self.scene.rejoin();
-                Changed { placements: regrouped, ..Changed::default() }.into()
-            }
+    pub(super) fn grab(&mut self, at: [f32; 2]) -> Effect {
+        self.drag = None;
+        if self.grabs(at)
+            && let Some((entity, anchor)) = self.hit(at)
+        {
+            let data = &self.scene.data;
+            let before = edit::pieces(data, entity).into_iter().map(|piece| (piece, data.entities[piece].clone()));
+            self.drag = Some(EntityDrag { before: before.collect(), anchor, moved: false });
         }
+        Effect::default()
     }
 
-    fn drag_to(&mut self, at: [f32; 2]) -> Effect {
+    pub(super) fn let_go(&mut self) -> Effect {
+        let moved = self.drag.take().is_some_and(|drag| drag.moved);
+        self.history.close();
+        // Back among what rests: the group is baked anew while the picture goes on by fields.
+        let regrouped = moved && self.scene.rejoin();
+        Changed { placements: regrouped, ..Changed::default() }.into()
+    }
+
+    pub(super) fn drag_to(&mut self, at: [f32; 2]) -> Effect {
         let reach_m = REACH * self.bounds().1.max(self.orbit.distance_m);
         let ray = self.ray(at);
         let Some(drag) = &mut self.drag else { return Effect::default() };

@@ -1,19 +1,17 @@
 //! Draws the viewer's frames into a window, an image or files.
 
 use super::command::Changed;
-use super::outline::outline;
-use super::preview;
-use super::save::unedited;
-use super::status::HISTORY;
-use super::viewer::Previewed;
-use super::viewer::{ERROR, REFERENCE, Viewer};
+use super::figures::HISTORY;
+use super::follow::unlit_viewport;
+use super::scenes::unedited;
+use super::viewer::{ERROR, Previewed, REFERENCE, Viewer};
 use crate::asset::edges::Edges;
 use crate::asset::picture;
-use crate::draw::camera::clip_from_world;
+use crate::draw::camera::{clip_from_world, world_from_centred};
 use crate::error::{Error, Result};
 use crate::frame::{self, RadiositySource, Relight, Viewport, record};
 use crate::gpu::{Access, Commands, FLIGHTS, Image, Window};
-use glam::DVec2;
+use glam::{DVec2, DVec4};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
@@ -56,8 +54,7 @@ impl Viewer {
         };
         let target = match (&canvas, &shot) {
             (FrameTarget::Image(image), _) => *image,
-            (_, Some(shot)) => &*shot.image,
-            (FrameTarget::Window(_), None) => unreachable!("a window gave a shot"),
+            (FrameTarget::Window(_), shot) => &*shot.as_ref().expect("a window gave a shot").image,
         };
         let size = [target.shape.width, target.shape.height];
         let viewports = self.viewports(size);
@@ -69,7 +66,7 @@ impl Viewer {
         let [redraws, relights] = self.refine(changed || resizes)?;
         // Clusters that were hidden during motion are lit when motion has ended.
         let stale = self.frame.as_ref().is_some_and(|frame| frame.stale_count() > 0);
-        let light = self.frame.is_some() && (pending.light() || pending.variant || stale || relights);
+        let light = self.frame.is_some() && (pending.light() || stale || relights);
         let mut frame = self.frame.as_mut();
         if let (None, Some(preview)) = (&frame, &mut self.preview) {
             // One without shadows has no suns, which stand behind the entities of the file.
@@ -152,7 +149,7 @@ impl Viewer {
         if self.frame.is_none() {
             return vec![match self.previewed {
                 Previewed::Light => Viewport::merged([0, 0, width, height]),
-                Previewed::Shapes | Previewed::Nothing => preview::viewport([width, height]),
+                Previewed::Shapes | Previewed::Nothing => unlit_viewport([width, height]),
             }];
         }
         let [own_width, _] = self.own_size_of([width, height]);
@@ -186,7 +183,7 @@ impl Viewer {
         Ok(format!("wrote {} and {}", png.display(), exr.display()))
     }
 
-    /// The outline of the selected entity in points.
+    /// The outline of the selected entity as the camera sees it, in points: its silhouette edges.
     pub(super) fn outline(&mut self) -> Vec<[egui::Pos2; 2]> {
         let Some(selected) = self.editor.selection else { return Vec::new() };
         let scene = self.editor.scene();
@@ -196,11 +193,14 @@ impl Viewer {
         let [width, height] = self.editor.size().map(f64::from);
         let camera = self.editor.camera();
         let size = DVec2::new(width, height) / f64::from(self.paint.pixels_per_point);
-        let placement = self.editor.placements()[selected];
-        let clip = clip_from_world(camera, width / height);
-        let lines = outline(edges, centre, &placement, clip, camera.eye.as_dvec3(), size);
-        let point = |p: DVec2| egui::pos2(p.x as f32, p.y as f32);
-        lines.into_iter().map(|line| line.map(point)).collect()
+        let world = world_from_centred(&self.editor.placements()[selected], centre);
+        let eye = world.inverse().transform_point3(camera.eye.as_dvec3());
+        let lines = edges.lines(clip_from_world(camera, width / height) * world, eye, false);
+        let point = |c: DVec4| {
+            let place = (DVec2::new(c.x, c.y) / c.w + 1.0) / 2.0 * size;
+            egui::pos2(place.x as f32, place.y as f32)
+        };
+        lines.into_iter().map(|line| line.ends.map(point)).collect()
     }
 }
 

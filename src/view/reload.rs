@@ -4,12 +4,10 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant, SystemTime};
 
-/// Interval between two polls.
-pub const PERIOD: Duration = Duration::from_millis(250);
+const PERIOD: Duration = Duration::from_millis(250);
 
 type Stamps = BTreeMap<String, (Option<SystemTime>, u64)>;
 
-/// Watches a folder of shader files.
 pub struct Watch {
     folder: PathBuf,
     stamps: Stamps,
@@ -30,11 +28,6 @@ impl Watch {
         if self.looked.elapsed() < PERIOD {
             return None;
         }
-        self.look()
-    }
-
-    /// As [`Watch::poll`], without waiting for the interval.
-    pub fn look(&mut self) -> Option<Vec<String>> {
         self.looked = Instant::now();
         let now = stamps(&self.folder);
         let names: BTreeSet<&String> = now.keys().chain(self.stamps.keys()).collect();
@@ -61,28 +54,4 @@ fn stamps(folder: &Path) -> Stamps {
         Some((entry.file_name().into_string().ok()?, (metadata.modified().ok(), metadata.len())))
     };
     entries.flatten().filter_map(stamp).collect()
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn changes_are_told_until_they_compile() {
-        let folder = tempfile::tempdir().unwrap();
-        let write = |name: &str, text: &str| std::fs::write(folder.path().join(name), text).unwrap();
-        write("a.glsl", "one");
-        let mut watch = Watch::new(folder.path());
-        assert_eq!(watch.look(), None);
-        assert_eq!(watch.poll(), None, "too early to look again");
-        write("a.glsl", "three");
-        write("b.glsl", "new");
-        assert_eq!(watch.look().unwrap(), ["a.glsl", "b.glsl"]);
-        assert_eq!(watch.look(), None, "told once");
-        write("b.glsl", "newer");
-        assert_eq!(watch.look().unwrap(), ["a.glsl", "b.glsl"], "the first has not compiled yet");
-        watch.compiled();
-        std::fs::remove_file(folder.path().join("a.glsl")).unwrap();
-        assert_eq!(watch.look().unwrap(), ["a.glsl"], "the built-in one is back");
-    }
 }

@@ -13,16 +13,12 @@ use std::time::{Duration, Instant};
 pub struct TaskProgress {
     /// Description of the current work.
     pub what: String,
-    /// Number of parts that are done.
     pub done: u32,
-    /// Number of parts.
     pub all: u32,
-    /// Time since the task began.
     pub elapsed: Duration,
 }
 
 impl TaskProgress {
-    /// Share of the parts that are done.
     pub fn share(&self) -> f32 {
         self.done as f32 / self.all.max(1) as f32
     }
@@ -81,7 +77,6 @@ impl<T: Send + 'static> BackgroundTask<T> {
         self.results.try_iter().collect()
     }
 
-    /// Time since it began.
     pub fn elapsed(&self) -> Duration {
         self.start.elapsed()
     }
@@ -95,7 +90,6 @@ impl<T: Send + 'static> BackgroundTask<T> {
         self.thread.take_if(|thread| thread.is_finished()).map(|thread| outcome(thread.join()))
     }
 
-    /// Whether it is still running.
     pub fn is_running(&self) -> bool {
         self.thread.as_ref().is_some_and(|thread| !thread.is_finished())
     }

@@ -1,16 +1,16 @@
-//! Draws the editor's state as frames with the overlay on top.
+//! The editor with everything that is needed to show it: commands and files come in, the overlay is run, messages are
+//! shown for a while.
 //!
 //! A frame is drawn into a window or into an image, so everything here also runs without a display.
 
-use super::Editor;
 use super::command::{Changed, Command, Effect};
 use super::compare::Reference;
+use super::editor::{Editor, add_sky};
+use super::follow::Pace;
 use super::input::{Event, Input};
 use super::overlay::{Overlay, Paint};
-use super::panel;
-use super::refine::Pace;
+use super::panel::{self, ErrorScale, Status};
 use super::reload::Watch;
-use super::status::ErrorScale;
 use super::task::{BackgroundTask, TaskProgress};
 use crate::asset::edges::Edges;
 use crate::bake::Baker;
@@ -19,10 +19,12 @@ use crate::draw::show::Show;
 use crate::error::{Error, Result};
 use crate::frame::{self, Frame};
 use crate::gpu::{self, Device, Flight, Timing};
-use crate::lists::gather::Counts;
+use crate::scene::{Scene, gltf};
 use crate::shaders::Library;
+use crate::truth::exposure;
 use ash::vk;
 use std::collections::{HashMap, VecDeque};
+use std::path::Path;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
@@ -30,7 +32,6 @@ use std::time::{Duration, Instant};
 pub(super) const REFERENCE: usize = 0;
 pub(super) const ERROR: usize = 1;
 
-/// Parameters of a viewer.
 pub struct Setup {
     pub device: Arc<Device>,
     /// Options with which background bakes open their own device.
@@ -52,7 +53,6 @@ pub struct Setup {
     pub preview_after: Duration,
 }
 
-/// What a preview shows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Previewed {
     Nothing,
@@ -62,12 +62,14 @@ pub enum Previewed {
     Light,
 }
 
-/// A line for the user.
+/// Time for which a message is shown.
+const SHOWN: Duration = Duration::from_secs(6);
+
 pub(super) struct Message {
-    pub(super) since: Instant,
-    pub(super) text: String,
+    since: Instant,
+    text: String,
     /// It is shown although the overlay is hidden, because something is at stake that the picture does not show.
-    pub(super) insists: bool,
+    insists: bool,
 }
 
 /// An editor with everything that is needed to show it.
@@ -114,10 +116,6 @@ pub struct Viewer {
     pub(super) repaint_at: Option<Instant>,
     /// The progress that was shown last.
     pub(super) told: [Option<TaskProgress>; 2],
-    /// Version of the light, and the lookups that its lists skip.
-    pub(super) counts: Option<(u64, Counts)>,
-    /// Time of the next count, which is limited because it visits every cluster and entity.
-    pub(super) count_at: Instant,
     pub(super) frame_count: u64,
     pub(super) build_count: u64,
     /// Frames that were drawn before the last build, until what that freed is given back.
@@ -161,8 +159,6 @@ impl Viewer {
             pace: Pace::default(),
             repaint_at: Some(Instant::now()),
             told: [None, None],
-            counts: None,
-            count_at: Instant::now(),
             frame_count: 0,
             build_count: 0,
             drawn_before: None,
@@ -174,12 +170,10 @@ impl Viewer {
         Ok(viewer)
     }
 
-    /// The state that is shown.
     pub fn editor(&self) -> &Editor {
         &self.editor
     }
 
-    /// As [`Editor::rescued`].
     pub fn rescued(&mut self, error: Error) -> Error {
         // The saved picture has the size of the window.
         self.editor.apply(Command::Resize(self.size));
@@ -196,12 +190,10 @@ impl Viewer {
         self.frame.as_ref()
     }
 
-    /// egui's context, for its input and output.
     pub fn egui(&self) -> &egui::Context {
         &self.egui
     }
 
-    /// Whether the user asked to close the window.
     pub fn wants_to_quit(&self) -> bool {
         self.quit
     }
@@ -241,17 +233,11 @@ impl Viewer {
         self.shader_error.as_deref()
     }
 
-    /// Frames drawn so far.
-    pub fn frame_count(&self) -> u64 {
-        self.frame_count
-    }
-
     /// Scenes prepared for drawing so far, the same one anew where lights became occluders.
     pub fn build_count(&self) -> u64 {
         self.build_count
     }
 
-    /// Whether a frame would show something new.
     pub fn wants_frame(&self) -> bool {
         let moves = self.editor.running && self.editor.scene().data.entities.iter().any(|e| !e.motion.is_empty());
         let is_due = |at: Option<Instant>| at.is_some_and(|at| at <= Instant::now());
@@ -343,24 +329,11 @@ impl Viewer {
             }
         }
         self.preview()?;
-        self.count();
         let files = self.watch.as_mut().and_then(Watch::poll);
         if let Some(files) = files {
             self.reload(&files);
         }
         self.look_at_rays()
-    }
-
-    /// Counts the lookups that lists skip, if unknown, in at most a twentieth of the time.
-    fn count(&mut self) {
-        let Some(frame) = &self.frame else { return };
-        let known = self.counts.as_ref().is_some_and(|(version, _)| *version == self.version);
-        if !known && self.editor.overlay && Instant::now() >= self.count_at {
-            let start = Instant::now();
-            self.counts = Some((self.version, frame.counts(&self.editor.placements())));
-            self.count_at = Instant::now() + (20 * start.elapsed()).max(Duration::from_millis(500));
-            self.pending.display = true;
-        }
     }
 
     /// Size of the viewport that shows the merged picture: the window's left half beside a reference.
@@ -371,5 +344,140 @@ impl Viewer {
     /// The same in a window of another size.
     pub(super) fn own_size_of(&self, [width, height]: [u32; 2]) -> [u32; 2] {
         [if self.editor.reference { (width / 2).max(1) } else { width }, height]
+    }
+
+    /// Shows another scene in place of this one: a scene file, a glTF file or an OBJ file, such as one that was dropped
+    /// on the window. What is left out of it is said. A file that cannot be opened is one line over the picture, and
+    /// the scene stays. Edits that are not saved are kept: undo returns to them, and a line says so.
+    pub fn open(&mut self, path: &Path) -> Result<()> {
+        let (scene, notes) = match self.read(path) {
+            Ok(read) => read,
+            Err(error) => {
+                self.insist(format!("not opened: {error}"));
+                return Ok(());
+            }
+        };
+        notes.iter().for_each(|note| self.insist(format!("{}: {note}", path.display())));
+        let effect = self.editor.open(scene, path);
+        self.insist(format!("opened {}", path.display()));
+        effect.message.into_iter().for_each(|message| self.insist(message));
+        self.input.commands(Event::Lost, &self.editor);
+        self.follow(effect.changed)
+    }
+
+    /// A scene, and what a reader of its glTF file has to know.
+    fn read(&self, path: &Path) -> Result<(Scene, Vec<String>)> {
+        let (mut scene, notes) = Scene::load_with_notes(path, &gltf::Options::default())?;
+        let left_out = notes.left_out();
+        if self.setup.strict && !left_out.is_empty() {
+            return Err(Error::input(path, format!("--strict: {}", left_out.join("; "))));
+        }
+        add_sky(&mut scene);
+        let [width, height] = self.size.map(f64::from);
+        scene.fit_added_camera(width / height);
+        let time_s = scene.data.output.time_s;
+        let exposed = exposure::settle(&mut scene, time_s, width / height);
+        Ok((scene, left_out.into_iter().chain(notes.said().iter().cloned()).chain(exposed).collect()))
+    }
+
+    /// Ends the window, at the second time if there are edits that are not saved.
+    pub(super) fn close(&mut self) {
+        let unsaved = self.editor.unsaved();
+        if unsaved.is_empty() || self.asked_to_close {
+            self.quit = true;
+            return;
+        }
+        let unsaved: Vec<String> = unsaved.iter().map(|path| path.display().to_string()).collect();
+        self.asked_to_close = true;
+        self.insist(format!("unsaved edits of {}: Ctrl-S saves, Ctrl-Q again closes without", unsaved.join(" and ")));
+    }
+
+    /// Runs the overlay on egui's input and executes the commands of its widgets.
+    pub fn ui(&mut self, input: egui::RawInput) -> Result<egui::PlatformOutput> {
+        let lines = self.outline();
+        let status = self.status();
+        let context = self.egui.clone();
+        let mut commands = Vec::new();
+        let output = context.run_ui(input, |ui| {
+            panel::outline(ui.ctx(), &lines);
+            commands.extend(panel::show(ui.ctx(), &self.editor, &status));
+        });
+        drop(status);
+        let delay = output.viewport_output.values().map(|v| v.repaint_delay).min();
+        self.repaint_at = delay.and_then(|delay| Instant::now().checked_add(delay));
+        self.paint = Paint {
+            primitives: context.tessellate(output.shapes, output.pixels_per_point),
+            pixels_per_point: output.pixels_per_point,
+        };
+        self.overlay.update(output.textures_delta)?;
+        for command in commands {
+            self.apply(command)?;
+        }
+        Ok(output.platform_output)
+    }
+
+    fn status(&self) -> Status<'_> {
+        let info = &self.setup.device.info;
+        Status {
+            device: &info.name,
+            driver: &info.driver,
+            size: self.size,
+            refined: self.setup.refines.then(|| self.is_refined()),
+            timings: &self.timings,
+            vertices: self.frame.as_ref().map(Frame::receiver_vertex_count),
+            lights: self.setup.frame.lights,
+            bake: self.bake.as_ref().map(BackgroundTask::progress),
+            rays: self.rays.as_ref().filter(|rays| rays.is_running()).map(BackgroundTask::progress),
+            reference: self.reference.as_ref().map(|r| (r.rays, r.error, r.version == self.version)),
+            error: self.error_shown.as_ref().map(|(version, _, scale)| (*scale, *version == self.version)),
+            shader_error: self.shader_error.as_deref(),
+            messages: self.messages(),
+        }
+    }
+
+    pub fn message(&self) -> Option<&str> {
+        self.messages.back().map(|message| message.text.as_str())
+    }
+
+    /// The messages that are shown, oldest first.
+    pub fn messages(&self) -> Vec<&str> {
+        let shown = self.messages.iter().filter(|message| message.insists || self.editor.overlay);
+        shown.map(|message| message.text.as_str()).collect()
+    }
+
+    pub(super) fn say(&mut self, message: Option<String>) {
+        if let Some(text) = message {
+            self.add(text, false);
+        }
+    }
+
+    /// As [`Viewer::say`], also where the overlay is hidden.
+    pub fn insist(&mut self, text: String) {
+        self.add(text, true);
+    }
+
+    fn add(&mut self, text: String, insists: bool) {
+        log::info!("message: {text}");
+        self.messages.push_back(Message { since: Instant::now(), text, insists });
+        self.pending |= Changed { display: true, ..Changed::default() };
+    }
+
+    /// Forgets messages that were shown long enough. Returns whether there were any.
+    pub(super) fn forget_messages(&mut self) -> bool {
+        let count = self.messages.len();
+        self.messages.retain(|message| message.since.elapsed() < SHOWN);
+        count != self.messages.len()
+    }
+
+    /// Returns `Device` and `Unsupported` errors; all other errors become messages.
+    pub(super) fn tolerate<T>(&mut self, outcome: Result<T>) -> Result<Option<T>> {
+        match outcome {
+            Ok(value) => Ok(Some(value)),
+            Err(error @ (Error::Device(_) | Error::Unsupported(_))) => Err(error),
+            Err(error) => {
+                self.say(Some(error.to_string()));
+                Ok(None)
+            }
+        }
     }
 }

@@ -22,11 +22,6 @@ impl Display {
             common::skip("no xdotool");
             return None;
         }
-        Self::alone(folder)
-    }
-
-    /// One without hands on its keys; `None` where Xvfb is missing.
-    pub fn alone(folder: &Path) -> Option<Self> {
         // The server picks a free number and tells it.
         let server = Command::new("Xvfb")
             .args(["-displayfd", "1", "-screen", "0", "640x480x24", "-noreset", "-fbdir"])

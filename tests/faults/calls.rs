@@ -76,9 +76,6 @@ layer! {
         vkCreateDevice: PFN_vkCreateDevice(PhysicalDevice, DeviceCreateInfo, Device) [LOST];
         vkCreateDebugUtilsMessengerEXT: PFN_vkCreateDebugUtilsMessengerEXT(
             Instance, DebugUtilsMessengerCreateInfoEXT, DebugUtilsMessengerEXT) [HOST_MEMORY];
-        vkCreateXlibSurfaceKHR: PFN_vkCreateXlibSurfaceKHR(Instance, XlibSurfaceCreateInfoKHR, SurfaceKHR) [MEMORY];
-        vkCreateXcbSurfaceKHR: PFN_vkCreateXcbSurfaceKHR(Instance, XcbSurfaceCreateInfoKHR, SurfaceKHR) [MEMORY];
-        vkCreateSwapchainKHR: PFN_vkCreateSwapchainKHR(Device, SwapchainCreateInfoKHR, SwapchainKHR) [LOST];
         vkCreatePipelineCache: PFN_vkCreatePipelineCache(Device, PipelineCacheCreateInfo, PipelineCache) [MEMORY];
         vkCreateBuffer: PFN_vkCreateBuffer(Device, BufferCreateInfo, Buffer) [MEMORY];
         vkCreateBufferView: PFN_vkCreateBufferView(Device, BufferViewCreateInfo, BufferView) [MEMORY];
@@ -92,13 +89,10 @@ layer! {
         vkCreateDescriptorPool: PFN_vkCreateDescriptorPool(Device, DescriptorPoolCreateInfo, DescriptorPool) [MEMORY];
         vkCreateCommandPool: PFN_vkCreateCommandPool(Device, CommandPoolCreateInfo, CommandPool) [MEMORY];
         vkCreateFence: PFN_vkCreateFence(Device, FenceCreateInfo, Fence) [MEMORY];
-        vkCreateSemaphore: PFN_vkCreateSemaphore(Device, SemaphoreCreateInfo, Semaphore) [MEMORY];
         vkCreateQueryPool: PFN_vkCreateQueryPool(Device, QueryPoolCreateInfo, QueryPool) [MEMORY];
     }
     destroys {
         vkDestroyDebugUtilsMessengerEXT: PFN_vkDestroyDebugUtilsMessengerEXT(Instance, DebugUtilsMessengerEXT);
-        vkDestroySurfaceKHR: PFN_vkDestroySurfaceKHR(Instance, SurfaceKHR);
-        vkDestroySwapchainKHR: PFN_vkDestroySwapchainKHR(Device, SwapchainKHR);
         vkDestroyPipelineCache: PFN_vkDestroyPipelineCache(Device, PipelineCache);
         vkDestroyBuffer: PFN_vkDestroyBuffer(Device, Buffer);
         vkDestroyBufferView: PFN_vkDestroyBufferView(Device, BufferView);
@@ -111,7 +105,6 @@ layer! {
         vkDestroyDescriptorPool: PFN_vkDestroyDescriptorPool(Device, DescriptorPool);
         vkDestroyCommandPool: PFN_vkDestroyCommandPool(Device, CommandPool);
         vkDestroyFence: PFN_vkDestroyFence(Device, Fence);
-        vkDestroySemaphore: PFN_vkDestroySemaphore(Device, Semaphore);
         vkDestroyQueryPool: PFN_vkDestroyQueryPool(Device, QueryPool);
         vkDestroyPipeline: PFN_vkDestroyPipeline(Device, Pipeline);
         vkFreeMemory: PFN_vkFreeMemory(Device, DeviceMemory);
@@ -141,25 +134,14 @@ layer! {
             queue: vk::Queue, count: u32, infos: *const vk::SubmitInfo2<'_>, fence: vk::Fence) [LOST];
         vkWaitForFences: PFN_vkWaitForFences(
             device: vk::Device, count: u32, fences: *const vk::Fence, all: vk::Bool32, timeout: u64) [LOST];
-        vkQueueWaitIdle: PFN_vkQueueWaitIdle(queue: vk::Queue) [LOST];
         vkDeviceWaitIdle: PFN_vkDeviceWaitIdle(device: vk::Device) [LOST];
         vkGetQueryPoolResults: PFN_vkGetQueryPoolResults(
             device: vk::Device, pool: vk::QueryPool, first: u32, count: u32, size: usize, data: *mut c_void,
             stride: vk::DeviceSize, flags: vk::QueryResultFlags) [LOST];
-        vkGetPhysicalDeviceSurfaceSupportKHR: PFN_vkGetPhysicalDeviceSurfaceSupportKHR(
-            physical: vk::PhysicalDevice, family: u32, surface: vk::SurfaceKHR, supported: *mut vk::Bool32) [MEMORY];
-        vkGetPhysicalDeviceSurfaceCapabilitiesKHR: PFN_vkGetPhysicalDeviceSurfaceCapabilitiesKHR(
-            physical: vk::PhysicalDevice, surface: vk::SurfaceKHR, capabilities: *mut vk::SurfaceCapabilitiesKHR) [MEMORY];
-        vkGetPhysicalDeviceSurfaceFormatsKHR: PFN_vkGetPhysicalDeviceSurfaceFormatsKHR(
-            physical: vk::PhysicalDevice, surface: vk::SurfaceKHR, count: *mut u32, formats: *mut vk::SurfaceFormatKHR) [MEMORY];
-        vkGetPhysicalDeviceSurfacePresentModesKHR: PFN_vkGetPhysicalDeviceSurfacePresentModesKHR(
-            physical: vk::PhysicalDevice, surface: vk::SurfaceKHR, count: *mut u32, modes: *mut vk::PresentModeKHR) [MEMORY];
-        vkGetSwapchainImagesKHR: PFN_vkGetSwapchainImagesKHR(
-            device: vk::Device, swapchain: vk::SwapchainKHR, count: *mut u32, images: *mut vk::Image) [MEMORY];
     }
     special {
         vkEnumerateInstanceExtensionProperties, vkSetDebugUtilsObjectNameEXT, vkCreateInstance, vkDestroyInstance, vkDestroyDevice, vkGetDeviceProcAddr,
-        vkAllocateMemory, vkMapMemory, vkCreateComputePipelines, vkCreateGraphicsPipelines, vkAcquireNextImageKHR, vkQueuePresentKHR, vkGetPhysicalDeviceProperties,
+        vkAllocateMemory, vkMapMemory, vkCreateComputePipelines, vkCreateGraphicsPipelines, vkGetPhysicalDeviceProperties,
         vkGetPhysicalDeviceProperties2, vkGetPhysicalDeviceFeatures2, vkGetPhysicalDeviceQueueFamilyProperties,
         vkGetPhysicalDeviceMemoryProperties, vkGetBufferMemoryRequirements, vkGetImageMemoryRequirements,
     }

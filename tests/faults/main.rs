@@ -12,10 +12,6 @@ mod claimed;
 mod claims;
 #[path = "../common/mod.rs"]
 mod common;
-#[cfg(all(feature = "view", target_os = "linux"))]
-mod display;
-#[path = "../common/display.rs"]
-mod server;
 mod special;
 mod sweep;
 #[cfg(feature = "view")]
@@ -85,12 +81,6 @@ fn silhouettes(folder: &Path) -> Result<()> {
     run(folder, &["bake", "@mesh.obj", "-o", "@s.sf", "--silhouette", "--quality", "draft"])
 }
 
-/// What a window shows, drawn into an image: its fields are in the cache.
-#[cfg(feature = "view")]
-fn window(folder: &Path) -> Result<()> {
-    window::run(folder)
-}
-
 /// Where only some calls fail, the others do in a job before.
 const JOBS: &[Job] = &[
     Job { name: "picture", run: picture, outputs: &["p.png", "p.exr", "v.csv"], cold: &["cache/fields"], only: None },
@@ -99,16 +89,12 @@ const JOBS: &[Job] = &[
     Job { name: "bake", run: bake, outputs: &["f.sf"], cold: &[], only: None },
     Job { name: "silhouettes", run: silhouettes, outputs: &["s.sf"], cold: &[], only: None },
     #[cfg(feature = "view")]
-    Job { name: "window", run: window, outputs: &["w.raw"], cold: &[], only: None },
-    #[cfg(all(feature = "view", target_os = "linux"))]
-    Job { name: "display", run: display::run, outputs: &["d.raw"], cold: &[], only: Some(&["KHR", "Semaphore"]) },
+    Job { name: "window", run: window::run, outputs: &["w.raw"], cold: &[], only: None },
 ];
 
 /// A folder with inputs, held by one test at a time: the layer is the whole process's.
 struct Place {
     folder: tempfile::TempDir,
-    /// A display for windows, if there is one.
-    display: Option<server::Display>,
     _turn: MutexGuard<'static, ()>,
 }
 
@@ -124,7 +110,7 @@ impl Place {
         std::fs::write(folder.path().join("scene.toml"), SCENE).unwrap();
         std::fs::write(folder.path().join("mesh.obj"), MESH).unwrap();
         match run(folder.path(), &["devices"]) {
-            Ok(()) => Some(Place { folder, display: None, _turn: turn }),
+            Ok(()) => Some(Place { folder, _turn: turn }),
             Err(Error::Unsupported(error)) => {
                 common::skip(&error);
                 None
@@ -136,40 +122,12 @@ impl Place {
     fn path(&self) -> &Path {
         self.folder.path()
     }
-
-    /// Whether what a job needs is there.
-    fn has(&mut self, job: &Job) -> bool {
-        if job.name == "display" {
-            self.display = server::Display::alone(self.path());
-            if let Some(display) = &self.display {
-                std::fs::write(self.path().join("display"), &display.name).unwrap();
-            }
-            return self.display.is_some();
-        }
-        true
-    }
 }
 
 #[test]
 fn faults_in_some_of_all_calls_are_survived() {
     let share = std::env::var("FAULTS_SHARE").map_or(10, |text| text.parse().expect("a number"));
-    let Some(mut place) = Place::new() else { return };
-    let mut count = 0;
-    for job in JOBS {
-        if place.has(job) {
-            count += job.sweep(place.path(), share);
-        }
-    }
+    let Some(place) = Place::new() else { return };
+    let count: usize = JOBS.iter().map(|job| job.sweep(place.path(), share)).sum();
     assert!(count > 20, "hardly anything failed: {count}");
-}
-
-/// What an out-of-date swapchain did not show is shown by the next, though nothing else changes.
-#[test]
-#[cfg(all(feature = "view", target_os = "linux"))]
-fn a_picture_that_was_not_shown_is_shown_again() {
-    let Some(mut place) = Place::new() else { return };
-    let job = JOBS.iter().find(|job| job.name == "display").expect("the job");
-    if place.has(job) {
-        job.last(place.path(), "vkQueuePresentKHR", ash::vk::Result::ERROR_OUT_OF_DATE_KHR);
-    }
 }

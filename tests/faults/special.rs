@@ -1,4 +1,4 @@
-//! Calls whose wrappers do more than fail: those that make instances, memory, pipelines and pictures of a window.
+//! Calls whose wrappers do more than fail: those that make instances, memory and pipelines.
 
 #![allow(unsafe_code)]
 
@@ -163,44 +163,3 @@ macro_rules! pipelines {
 
 pipelines!(vkCreateComputePipelines, PFN_vkCreateComputePipelines, ComputePipelineCreateInfo);
 pipelines!(vkCreateGraphicsPipelines, PFN_vkCreateGraphicsPipelines, GraphicsPipelineCreateInfo);
-
-/// What showing a picture may answer; a suboptimal swapchain has shown it all the same.
-const SHOWING: &[vk::Result] = &[
-    vk::Result::ERROR_OUT_OF_DEVICE_MEMORY,
-    vk::Result::ERROR_DEVICE_LOST,
-    vk::Result::ERROR_OUT_OF_DATE_KHR,
-    vk::Result::SUBOPTIMAL_KHR,
-];
-
-/// The answer of a call that shows a picture: `real` is called unless the fault is an error.
-fn shown(name: &'static str, real: impl FnOnce() -> vk::Result) -> vk::Result {
-    match fault(name, SHOWING) {
-        Some(vk::Result::SUBOPTIMAL_KHR) => match real() {
-            vk::Result::SUCCESS => vk::Result::SUBOPTIMAL_KHR,
-            other => other,
-        },
-        Some(error) => error,
-        None => real(),
-    }
-}
-
-module! {
-    vkAcquireNextImageKHR: PFN_vkAcquireNextImageKHR(
-        device: vk::Device, swapchain: vk::SwapchainKHR, timeout: u64, semaphore: vk::Semaphore, fence: vk::Fence,
-        index: *mut u32
-    ) -> vk::Result {
-        shown("vkAcquireNextImageKHR", || {
-            // SAFETY: the caller keeps the contract of this very function.
-            unsafe { REAL.get().expect("wrapped")(device, swapchain, timeout, semaphore, fence, index) }
-        })
-    }
-}
-
-module! {
-    vkQueuePresentKHR: PFN_vkQueuePresentKHR(queue: vk::Queue, info: *const vk::PresentInfoKHR<'_>) -> vk::Result {
-        shown("vkQueuePresentKHR", || {
-            // SAFETY: the caller keeps the contract of this very function.
-            unsafe { REAL.get().expect("wrapped")(queue, info) }
-        })
-    }
-}

@@ -1,4 +1,4 @@
-//! What a window shows, drawn into an image: all of a window but its surface.
+//! What a window shows, drawn into an image: all of a window but its surface and swapchain.
 
 use shadow_fields::bake::cache::Cache;
 use shadow_fields::draw::{Antialias, Shading};
@@ -12,78 +12,52 @@ use std::path::Path;
 use std::sync::Arc;
 use std::time::Duration;
 
-pub const SIZE: [u32; 2] = [48, 32];
+const SIZE: [u32; 2] = [48, 32];
 const FORMAT: ash::vk::Format = ash::vk::Format::R8G8B8A8_SRGB;
 
-/// Draws frames of a scene that is edited, with the overlay, and writes the last as `w.raw`.
+/// Draws a still scene with the overlay, then the same edited, then without the overlay, and writes the last frame as
+/// `w.raw`. The scene's fields are in the cache.
 pub fn run(folder: &Path) -> Result<()> {
-    let options = device_options(folder);
+    let cache_dir = folder.join("cache");
+    let options = DeviceOptions { cache_dir: Some(cache_dir.clone()), ..DeviceOptions::default() };
     let device = Device::new(&options)?;
     let [width, height] = SIZE;
     let image = Image::new(&device, "window", ImageShape { format: FORMAT, width, height, samples: 1 })?;
-    let mut viewer = viewer(folder, device.clone(), options, FORMAT)?;
-    show(&mut viewer, &mut |viewer| viewer.draw(FrameTarget::Image(&image)))?;
-    let pixels = look(&device, &image)?;
-    drop(viewer);
-    device.save_pipeline_cache();
-    std::fs::write(folder.join("w.raw"), pixels).map_err(|error| Error::Failed(error.to_string()))
-}
-
-pub fn device_options(folder: &Path) -> DeviceOptions {
-    DeviceOptions { cache_dir: Some(folder.join("cache")), ..DeviceOptions::default() }
-}
-
-/// A viewer of the folder's scene that draws into targets of that format.
-pub fn viewer(folder: &Path, device: Arc<Device>, options: DeviceOptions, format: ash::vk::Format) -> Result<Viewer> {
-    let cache_dir = folder.join("cache");
-    let path = folder.join("scene.toml");
     let setup = Setup {
-        device,
+        device: device.clone(),
         options,
         library: Library { shader_dir: None, cache_dir: Some(cache_dir.clone()) },
         cache: Cache::new(Some(&cache_dir)),
         frame: frame_options(),
-        format,
+        format: FORMAT,
         seed: 1,
         strict: false,
         refines: false,
         preview_after: Duration::from_secs(60),
     };
-    let editor = Editor::new(Scene::load(&path)?, &path);
-    let mut viewer = Viewer::new(setup, editor, 1.0)?;
+    let path = folder.join("scene.toml");
+    let mut viewer = Viewer::new(setup, Editor::new(Scene::load(&path)?, &path), 1.0)?;
     viewer.apply(Command::Resize(SIZE))?;
     viewer.apply(Command::ToggleRunning)?;
     while viewer.is_baking() {
         std::thread::yield_now();
         viewer.update(0.0)?;
     }
-    Ok(viewer)
-}
-
-/// Shows a still scene, then the same edited, then without the overlay. `draw` is called until it answers that a frame
-/// is seen.
-pub fn show(viewer: &mut Viewer, draw: &mut dyn FnMut(&mut Viewer) -> Result<bool>) -> Result<()> {
-    let [width, height] = SIZE.map(|side| side as f32);
-    let screen = egui::Rect::from_min_size(egui::Pos2::ZERO, egui::vec2(width, height));
-    let mut turn = |viewer: &mut Viewer| {
-        viewer.update(0.0)?;
-        let _ = viewer.ui(egui::RawInput { screen_rect: Some(screen), ..Default::default() })?;
-        draw(viewer)
-    };
+    let screen = egui::Rect::from_min_size(egui::Pos2::ZERO, egui::vec2(width as f32, height as f32));
     for command in [None, Some(Command::SetSky(0.5)), Some(Command::ToggleOverlay)] {
         command.map_or(Ok(()), |command| viewer.apply(command))?;
-        for turns in 0.. {
-            assert!(turns < 100, "the window never comes to rest");
-            if turn(viewer)? {
-                break;
-            }
-        }
+        viewer.update(0.0)?;
+        let _ = viewer.ui(egui::RawInput { screen_rect: Some(screen), ..Default::default() })?;
+        viewer.draw(FrameTarget::Image(&image))?;
     }
     viewer.settle()?;
-    match viewer.frame() {
-        Some(_) => Ok(()),
-        None => Err(Error::Failed(viewer.message().unwrap_or("no frame, and nothing is said of it").to_owned())),
+    if viewer.frame().is_none() {
+        return Err(Error::Failed(viewer.message().unwrap_or("no frame, and nothing is said of it").to_owned()));
     }
+    let pixels = look(&device, &image)?;
+    drop(viewer);
+    device.save_pipeline_cache();
+    std::fs::write(folder.join("w.raw"), pixels).map_err(|error| Error::Failed(error.to_string()))
 }
 
 fn frame_options() -> frame::Options {

@@ -160,7 +160,7 @@ impl Target {
 
     /// Whether its seeds have a mark in them that [`targets`] takes out for every second input only.
     fn is_sealed(&self) -> bool {
-        ["sf", "outlines", "selfvis", "slice"].contains(&self.name)
+        ["sf", "outlines", "slice"].contains(&self.name)
     }
 }
 

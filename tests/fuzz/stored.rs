@@ -1,4 +1,4 @@
-//! What bakes store: fields, outlines, and what vertices see of their own mesh.
+//! What bakes store: fields and outlines.
 
 use super::common::generate;
 use super::targets::{NAME, bordered, sealed, with_file};
@@ -7,7 +7,7 @@ use serde::de::DeserializeOwned;
 use shadow_fields::Result;
 use shadow_fields::bake;
 use shadow_fields::error::Error;
-use shadow_fields::field::file::{self, FIELD_MAGIC, SURFACES_MAGIC};
+use shadow_fields::field::file::{self, FIELD_MAGIC};
 use shadow_fields::field::silhouette::{SILHOUETTE_MAGIC, SilhouetteField, SilhouetteHeader};
 use shadow_fields::field::{FieldKind, ShadowField, Storage};
 use std::path::Path;
@@ -80,18 +80,4 @@ pub fn outline(bytes: &[u8]) -> Result<()> {
         assert!((0.0..=1.0).contains(&blocked), "{blocked} of a light is blocked");
     }
     Ok(())
-}
-
-const MAGICS: [[u8; 8]; 3] = [SURFACES_MAGIC, FIELD_MAGIC, SILHOUETTE_MAGIC];
-
-pub fn payloads() -> Vec<Vec<u8>> {
-    let header = serde_json::json!({ "mesh_hash": "00", "face_px": 16, "offset": 1e-3, "side": 16, "vertex_count": 2 });
-    let of = |magic| written(|path| file::write(path, magic, &header, &[7; 64]).unwrap());
-    MAGICS.into_iter().take(2).map(of).collect()
-}
-
-pub fn payload(bytes: &[u8]) -> Result<()> {
-    let sealed = sealed(bytes);
-    let [first, ..] = MAGICS.map(|magic| file::parse::<serde_json::Value>(&sealed, Path::new(NAME), magic).map(|_| ()));
-    first
 }

@@ -3,14 +3,11 @@
 use super::common::generate;
 use super::{farm, stored};
 use glam::DVec3;
+use shadow_fields::Result;
 use shadow_fields::asset::equirect::Equirect;
 use shadow_fields::asset::{Mesh, embedded, picture};
 use shadow_fields::error::Error;
-use shadow_fields::field::Lattice;
-use shadow_fields::gpu::shader;
-use shadow_fields::merge::calibrate::Calibration;
 use shadow_fields::scene::{Scene, gltf};
-use shadow_fields::{Result, app};
 use std::path::Path;
 
 /// A parser, what it says to an input, and words of its format.
@@ -40,7 +37,6 @@ pub const TARGETS: &[Target] = &[
     Target { name: "glb", seeds: models, tokens: GLTF, parse: model, reads_file: true },
     Target { name: "sf", seeds: stored::fields, tokens: HEADER, parse: stored::field, reads_file: true },
     Target { name: "outlines", seeds: stored::outlines, tokens: HEADER, parse: stored::outline, reads_file: true },
-    Target { name: "selfvis", seeds: stored::payloads, tokens: HEADER, parse: stored::payload, reads_file: true },
     Target {
         name: "picture",
         seeds: pictures,
@@ -50,25 +46,8 @@ pub const TARGETS: &[Target] = &[
         parse: decode,
         reads_file: false,
     },
-    Target {
-        name: "lattice",
-        seeds: lattices,
-        tokens: "\
-            cube:|x|,inner=|,outer=|,edges|,edges=auto|,round|,centre=|,stretch=|:",
-        parse: lattice,
-        reads_file: false,
-    },
-    Target { name: "spirv", seeds: words, tokens: "", parse: spirv, reads_file: false },
-    Target {
-        name: "calibration",
-        seeds: calibrations,
-        tokens: "\"driver\":|null|1e999|[|]|{|}",
-        parse: calibration,
-        reads_file: false,
-    },
     Target { name: "plan", seeds: farm::plans, tokens: farm::TOKENS, parse: farm::plan, reads_file: true },
     Target { name: "slice", seeds: farm::slices, tokens: farm::TOKENS, parse: farm::slice, reads_file: false },
-    Target { name: "options", seeds: options, tokens: OPTIONS, parse: option, reads_file: false },
 ];
 
 const TOML: &str = "\
@@ -83,10 +62,6 @@ const GLTF: &str = "\
     \"mode\":\"INDICES\"|\"filter\":\"QUATERNION\"|\"targets\":[{|\"skin\":0|null|1e999|{|}|[|]";
 const HEADER: &str =
     "\"bands\":|\"lattice\":|\"shells\":|\"cells\":|\"map_px\":|\"view_px\":|\"radius_m\":|null|1e999|{|}|[|]";
-const OPTIONS: &str = "\
-    render\n|bake\n|inspect\n|view\n|check\n|bench\n|demo\n|profile\n|devices\n|-o\n|--lattice\n|--size\n|\
-    --frames\n|--time\n|--skip\n|--eps\n|--radiance\n|--lights\n|--variant\n|--face-px\n|--bands\n|--seed\n|\
-    --quality\n|--json\n|=|,|x";
 
 fn meshes() -> Vec<Vec<u8>> {
     let cut = "v 0 0 0 1 0 0\nv 1 0 0 0 1 0\nv 0 1 0 0 0 1\nvn 0 0 1\nvt 0 0\nf 1/1/1 2/1/1 3//1\nf -1 -2 -3\n# end\n";
@@ -204,79 +179,4 @@ fn decode(bytes: &[u8]) -> Result<()> {
     assert!(finite, "a coefficient is not finite");
     assert!(picture.radiance(DVec3::new(0.6, 0.0, -0.8)).is_finite());
     Ok(())
-}
-
-fn lattices() -> Vec<Vec<u8>> {
-    [
-        "cube:20x7",
-        "cube:8x5,inner=0.9,outer=5,edges",
-        "cube:2x3,round",
-        "cube:3x3,centre=0:1:0,stretch=1:1:2,edges=auto",
-    ]
-    .map(|text| text.into())
-    .into()
-}
-
-fn lattice(bytes: &[u8]) -> Result<()> {
-    let text = String::from_utf8_lossy(bytes);
-    let lattice: Lattice = text.parse().map_err(Error::Usage)?;
-    let again: Lattice = lattice.to_string().parse().unwrap_or_else(|error| panic!("{lattice} is refused: {error}"));
-    assert_eq!(again, lattice, "its text says something else");
-    assert!(lattice.position(lattice.sample_count() - 1).is_finite());
-    Ok(())
-}
-
-/// The key under which compiled words are kept here.
-const KEY: &str = "0123456789abcdef0123456789abcdef";
-
-fn words() -> Vec<Vec<u8>> {
-    let words = [0x0723_0203_u32, 0x0001_0500, 0, 8, 0].map(u32::to_le_bytes).concat();
-    let mut file = blake3::Hasher::new().update(KEY.as_bytes()).update(&words).finalize().as_bytes().to_vec();
-    file.extend(&words);
-    vec![file]
-}
-
-fn spirv(bytes: &[u8]) -> Result<()> {
-    match shader::words(KEY, bytes) {
-        None => Err(Error::Failed("not sealed".into())),
-        Some(words) => {
-            assert_eq!(bytes, &super::targets::words()[0], "{} words pass that nobody compiled", words.len());
-            Ok(())
-        }
-    }
-}
-
-fn calibrations() -> Vec<Vec<u8>> {
-    let known = Calibration {
-        driver: "d".into(),
-        program: "p".into(),
-        fastest: "texel".into(),
-        milliseconds: vec![("texel".into(), Some(1.5)), ("storage".into(), None)],
-    };
-    vec![serde_json::to_vec(&known).unwrap()]
-}
-
-fn calibration(bytes: &[u8]) -> Result<()> {
-    serde_json::from_slice::<Calibration>(bytes).map(|_| ()).map_err(|error| Error::Failed(error.to_string()))
-}
-
-/// Arguments stand on lines.
-fn options() -> Vec<Vec<u8>> {
-    [
-        "render\ns.toml\n-o\np.png\n--frames\n3\n--time\n1.5\n--size\n64x48\n--skip\nall\n--eps\n0.01\n--lattice\ncube:2x3",
-        "bake\nm.obj\n-o\nf.sf\n--radiance\n1,0.5,0.2\n--quality\nhigh",
-        "inspect\nf.sf\n--faces\nsheet.png",
-        "bench\ntime-error\n--out\no\n--json",
-        "check\nmerge\n--seed\n7\n-vv",
-        #[cfg(feature = "view")]
-        "view\ns.toml\n--size=64x48\n--present-mode\nfifo\n--paused",
-    ]
-    .into_iter()
-    .map(|text| text.into())
-    .collect()
-}
-
-fn option(bytes: &[u8]) -> Result<()> {
-    let text = String::from_utf8_lossy(bytes).into_owned();
-    app::understand(["shadow-fields"].into_iter().chain(text.split('\n')))
 }

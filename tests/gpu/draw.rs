@@ -4,12 +4,11 @@ use crate::stage;
 use glam::{Quat, Vec2, Vec3};
 use shadow_fields::asset::environment::EnvironmentData;
 use shadow_fields::asset::mesh::Attributes;
-use shadow_fields::asset::picture::srgb_from_linear;
 use shadow_fields::asset::texture::{Texels, Texture, Wrap};
 use shadow_fields::asset::{Generator, Mesh};
 use shadow_fields::bake::Baker;
-use shadow_fields::draw::{Antialias, Finish};
-use shadow_fields::frame::{self, PictureMemory};
+use shadow_fields::draw::Antialias;
+use shadow_fields::frame;
 use shadow_fields::scene::data::{Camera, EntityData};
 use shadow_fields::scene::{Albedo, Placement, Scene};
 use shadow_fields::shaders::Library;
@@ -115,24 +114,18 @@ fn nothing_in_view_is_a_picture_too() {
     let scene = balls("environment = { uniform = [0.25, 0.5, 0.75] }", &[RED, BLUE]);
     let (seen, unseen) = ([at(-0.5, 0.0, 0.0), at(0.5, 0.2, 0.0)], [at(0.0, 0.0, 9.0), at(0.0, 1.0, 9.0)]);
     for antialias in [Antialias::None, Antialias::Samples, Antialias::Outlines] {
-        for finish in [Finish::Linear, Finish::Display] {
-            let mut frame = stage.frame(&scene, options(antialias));
-            frame.set_finish(finish, antialias).unwrap();
-            // 8 bits of a display's picture tell values apart by 0.003 here.
-            let is_background = |picture: &[f32]| {
-                picture.chunks_exact(3).all(|p| (0..3).all(|c| (p[c] - [0.25, 0.5, 0.75][c]).abs() < 4e-3))
-            };
-            frame.render(&unseen, Some(1.0)).unwrap();
-            assert!(is_background(&frame.picture()), "{antialias:?}, {finish:?}: nothing in the first picture");
-            frame.render(&seen, Some(1.0)).unwrap();
-            let first = frame.picture();
-            assert!(!is_background(&first), "{antialias:?}, {finish:?}: something is seen");
-            frame.render(&unseen, Some(1.0)).unwrap();
-            assert!(is_background(&frame.picture()), "{antialias:?}, {finish:?}: nothing is seen any more");
-            frame.show(&unseen, 1.0).unwrap();
-            frame.render(&seen, Some(1.0)).unwrap();
-            assert!(frame.picture() == first, "{antialias:?}, {finish:?}: what comes back is as it was");
-        }
+        let mut frame = stage.frame(&scene, options(antialias));
+        let is_background = |picture: &[f32]| picture.chunks_exact(3).all(|p| *p == [0.25, 0.5, 0.75]);
+        frame.render(&unseen, Some(1.0)).unwrap();
+        assert!(is_background(&frame.picture()), "{antialias:?}: nothing in the first picture");
+        frame.render(&seen, Some(1.0)).unwrap();
+        let first = frame.picture();
+        assert!(!is_background(&first), "{antialias:?}: something is seen");
+        frame.render(&unseen, Some(1.0)).unwrap();
+        assert!(is_background(&frame.picture()), "{antialias:?}: nothing is seen any more");
+        frame.show(&unseen, 1.0).unwrap();
+        frame.render(&seen, Some(1.0)).unwrap();
+        assert!(frame.picture() == first, "{antialias:?}: what comes back is as it was");
     }
 }
 
@@ -410,39 +403,4 @@ fn textures_are_even_under_four_samples() {
         }
     }
     assert!(compared > 1000, "{compared} pixels");
-}
-
-/// A picture for a screen is the linear one over white, in 8 bits of sRGB.
-#[test]
-fn screens_are_shown_the_same() {
-    let Some(stage) = stage() else { return };
-    let scene = balls("environment = { uniform = [0.2, 0.5, 0.05] }", &[[4.0, 1.0, 0.3], [0.1, 0.2, 0.001]]);
-    let placements = [at(-0.5, 0.0, 0.0), at(0.6, 0.2, 0.0)];
-    let mut frame = stage.frame(&scene, options(Antialias::None));
-    let white = 2.0;
-    frame.render(&placements, Some(white)).unwrap();
-    let linear = frame.picture();
-    frame.set_finish(Finish::Display, Antialias::None).unwrap();
-    frame.render(&placements, Some(white)).unwrap();
-    for (shown, linear) in frame.picture().iter().zip(&linear) {
-        let levels = 255.0 * (srgb_from_linear(*shown) - srgb_from_linear(linear / white));
-        // Half a level of rounding, and as much for the device's own powers.
-        assert!(levels.abs() < 1.0, "{shown} against {linear}");
-    }
-    let brightest = linear.iter().fold(0.0_f32, |m, c| m.max(*c));
-    assert!((brightest - white).abs() < 1e-3 * white, "the ball is brighter than white: {brightest}");
-    // A frame that is only shown stays on the device; here nothing receives, so nothing is merged either.
-    let passes: Vec<_> = frame.show(&placements, white).unwrap().into_iter().map(|t| t.pass).collect();
-    assert_eq!(passes, ["draw"]);
-}
-
-#[test]
-fn what_is_said_of_memory_is_what_is_taken() {
-    let Some(stage) = stage() else { return };
-    for antialias in [Antialias::None, Antialias::Outlines, Antialias::Samples] {
-        let options = options(antialias);
-        let said = PictureMemory::new(&stage.gpu.device, &options);
-        let frame = stage.frame(&balls("", &[[1.0; 3]]), options);
-        assert_eq!(said.device, frame.memory().pictures, "{antialias:?}");
-    }
 }

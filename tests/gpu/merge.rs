@@ -229,18 +229,12 @@ fn lists_too_long_for_texel_views() {
     let baker = Baker::new(&device, &stage.gpu.library);
     for name in ["texel-packed", "texel-shifted"] {
         let mut frame = stage.frame_on(&baker, &scene, frame::Options { variant: variant(name), ..base });
-        for round in 0..2 {
-            assert_eq!(frame.variant().name, name, "all but the lists has room");
-            let found = stage.light(&mut frame, &placements);
-            assert_eq!(frame.variant().name, "storage", "{name}, round {round}");
-            let (worst, brightest) = stage::difference(&found[0], &expected[0]);
-            assert!(
-                brightest > 0.1 && worst <= 2e-6 * (1.0 + brightest),
-                "{name}, round {round}: {worst:e} of {brightest}"
-            );
-            assert_eq!(stage.light(&mut frame, &placements), found, "{name}: a frame leaves nothing to the next");
-            frame.set_variant(variant(name)).unwrap();
-        }
+        assert_eq!(frame.variant().name, name, "all but the lists has room");
+        let found = stage.light(&mut frame, &placements);
+        assert_eq!(frame.variant().name, "storage", "{name}");
+        let (worst, brightest) = stage::difference(&found[0], &expected[0]);
+        assert!(brightest > 0.1 && worst <= 2e-6 * (1.0 + brightest), "{name}: {worst:e} of {brightest}");
+        assert_eq!(stage.light(&mut frame, &placements), found, "{name}: a frame leaves nothing to the next");
     }
     assert_eq!(device.take_validation_messages(), [""; 0]);
 }

@@ -113,8 +113,6 @@ fn switches_are_said_to_have_changed() {
         assert!(editor.apply(command).changed.display);
     }
     assert_eq!(flags(&editor), before.map(|flag| !flag));
-    assert!(editor.apply(Command::SetVariant(Some("texel-packed"))).changed.variant);
-    assert_eq!(editor.variant(), Some("texel-packed"));
     assert!(!editor.apply(Command::Resize([0, 0])).changed.any(), "a minimised window has no picture");
     assert_eq!(editor.size(), [200, 100]);
 }

@@ -101,15 +101,6 @@ proptest! {
         prop_assert!(after.rotation.dot(before.rotation).abs() > 1.0 - 1e-6);
         prop_assert!((after.scale / before.scale - 1.0).abs() < 1e-6);
     }
-
-    /// Where things are is a function of time: asked in any order, and the same to the bit.
-    #[test]
-    fn motion_has_no_memory(entity in entity(), times in prop::collection::vec(time(), 1..20)) {
-        let forth: Vec<_> = times.iter().map(|t| entity.at(*t)).collect();
-        let back: Vec<_> = times.iter().rev().map(|t| entity.at(*t)).collect();
-        prop_assert!(forth.iter().eq(back.iter().rev()));
-        prop_assert!(forth.iter().all(|p| p.position.is_finite() && p.rotation.is_normalized() && p.scale > 0.0));
-    }
 }
 
 #[test]

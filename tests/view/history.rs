@@ -8,35 +8,13 @@ use shadow_fields::view::input::CONTROLS;
 use std::path::Path;
 
 #[test]
-fn a_slide_is_one_step_of_undo_and_two_are_two() {
-    let mut editor = from_text(SMALL);
-    let start = editor.scene().data.clone();
-    for ev in 1..9 {
-        editor.apply(Command::SetLight(ev as f32));
-    }
-    editor.apply(Command::EndSlide);
-    let first = editor.scene().data.clone();
-    editor.apply(Command::SetLight(10.0));
-    assert_eq!(editor.undo_count(), 2);
-    editor.apply(Command::Undo);
-    assert_eq!(editor.scene().data, first);
-    editor.apply(Command::Undo);
-    assert_eq!(editor.scene().data, start);
-    editor.apply(Command::Redo);
-    assert_eq!(editor.scene().data, first);
-    // A new change forgets what was taken back.
-    editor.apply(Command::SetExposure(2.0));
-    assert!(editor.apply(Command::Redo).message.is_some());
-}
-
-#[test]
 fn history_is_bounded() {
     let mut editor = from_text(SMALL);
     editor.apply(Command::SelectNext);
     for _ in 0..2000 {
         editor.apply(Command::ToggleLight);
     }
-    assert_eq!(editor.undo_count(), shadow_fields::view::history::STEP_LIMIT);
+    assert_eq!(editor.undo_count(), shadow_fields::view::edit::STEP_LIMIT);
 }
 
 fn any_command() -> impl Strategy<Value = Command> {
@@ -87,7 +65,7 @@ proptest! {
             prop_assert!(editor.placements().iter().all(|p| p.position.is_finite() && p.scale > 0.0 && p.rotation.is_normalized()));
             done += 1;
         }
-        prop_assert!(done < shadow_fields::view::history::STEP_LIMIT);
+        prop_assert!(done < shadow_fields::view::edit::STEP_LIMIT);
         let saved = Data::parse(&editor.data(Path::new("")).to_toml().unwrap(), Path::new("p.toml"));
         prop_assert!(saved.is_ok(), "{saved:?}");
         let end = editor.scene().data.clone();

@@ -1,4 +1,5 @@
 //! What stands behind the window, without a window: events in, state out.
+#![cfg(feature = "view")]
 
 mod camera;
 mod controls;

@@ -1,11 +1,8 @@
 //! The overlay's panels in windows of any size.
-#![cfg(feature = "view")]
 
 use egui::{Context, Event, Id, PointerButton, Pos2, Rect, pos2};
 use shadow_fields::gpu::Timing;
-use shadow_fields::lists::gather::Counts;
-use shadow_fields::view::panel::{show, style};
-use shadow_fields::view::status::{ErrorScale, Status};
+use shadow_fields::view::panel::{ErrorScale, Status, show, style};
 use shadow_fields::view::task::TaskProgress;
 use shadow_fields::view::{Command, Editor};
 use std::collections::VecDeque;
@@ -54,11 +51,8 @@ impl Stand {
             size: [1280, 720],
             refined: Some(true),
             timings: &timings,
-            counts: Some(Counts { considered: 123_456, ..Counts::default() }),
-            merged: Some((1234, 5678)),
-            vertices: 70_269,
+            vertices: Some(70_269),
             lights: Default::default(),
-            variant: Some("texel-packed"),
             bake: Some(progress.clone()),
             rays: Some(progress),
             reference: Some((16, 0.01, true)),
@@ -96,11 +90,6 @@ impl Stand {
         self.place(title).height() < 50.0
     }
 
-    /// Share of the window that the panels cover.
-    fn covered(&self) -> f32 {
-        [KEYS, FIGURES].map(|title| self.place(title).area()).iter().sum::<f32>() / self.screen.area()
-    }
-
     /// Sizes of all texts that are seen, points.
     fn texts(&mut self) -> Vec<(f32, String)> {
         let shapes = self.turn(Vec::new());
@@ -133,20 +122,11 @@ fn no_text_is_smaller_than_twelve_points() {
     stand.click(pos2(figures.left() + 30.0, figures.bottom() - 16.0));
     let sizes = stand.texts();
     let parts =
-        ["123 456", "turn the camera", "60/s", "ms", "too bright", "draw.frag", "exposure", "behind light", "ray cast"];
+        ["70 269", "turn the camera", "60/s", "ms", "too bright", "draw.frag", "exposure", "lights:", "ray cast"];
     for part in parts.into_iter().chain(["computing shadows: 33 %, 8 s left"]) {
         assert!(sizes.iter().any(|(_, text)| text.contains(part)), "{part:?} is not shown: {sizes:?}");
     }
     assert!(sizes.iter().all(|(size, _)| *size >= 12.0), "{sizes:?}");
-}
-
-#[test]
-fn panels_cover_at_most_a_fifth_of_a_window() {
-    for (size, folded) in [([1280.0, 720.0], false), ([960.0, 640.0], false), ([640.0, 360.0], true)] {
-        let stand = Stand::new(size);
-        assert!(stand.covered() < 0.2, "{size:?}: {}", stand.covered());
-        assert_eq!(stand.is_folded(FIGURES), folded, "{size:?}");
-    }
 }
 
 #[test]
@@ -198,19 +178,5 @@ fn panels_grow_back_after_the_window_was_small() {
         stand.resize(small);
         stand.resize([1280.0, 720.0]);
         assert_eq!(state(&mut stand), before, "{small:?}");
-    }
-}
-
-#[test]
-fn a_folded_panel_leaves_nothing_beside_it() {
-    let mut stand = Stand::new([1280.0, 720.0]);
-    let title = stand.place(FIGURES);
-    stand.click(title.left_top() + egui::vec2(20.0, 16.0));
-    let [keys, figures] = [KEYS, FIGURES].map(|title| stand.place(title).expand(2.0));
-    assert!(keys.height() < 50.0 && figures.height() < 50.0);
-    for clipped in stand.turn(Vec::new()) {
-        let drawn = clipped.shape.visual_bounding_rect().intersect(clipped.clip_rect);
-        let is_above = drawn.is_positive() && drawn.bottom() < 100.0;
-        assert!(!is_above || keys.contains_rect(drawn) || figures.contains_rect(drawn), "{drawn} beside {figures}");
     }
 }

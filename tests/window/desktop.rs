@@ -2,7 +2,6 @@
 
 use crate::cli::{COARSE, SMALL, command, finish, good, has_device};
 use crate::viewing::{OPTIONS, PATIENCE, SIZE, View, desk, open};
-use crate::xdnd::drop_file;
 use crate::{model, room};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
@@ -93,10 +92,9 @@ fn names(folder: &Path, ending: &str) -> Vec<PathBuf> {
     files.filter(|file| file.extension().is_some_and(|e| e == ending)).collect()
 }
 
-/// A GLB file with three parts that move and two lamps: in the window and as a picture, with no scene file. Then other
-/// files are dropped on the window.
+/// A GLB file with three parts that move and two lamps: in the window and as a picture, with no scene file.
 #[test]
-fn a_gltf_file_moves_in_the_window_and_dropped_files_open() {
+fn a_gltf_file_moves_in_the_window() {
     let Some((folder, display)) = desk() else { return };
     model::robot().write(folder.path(), "robot");
     good(folder.path(), &format!("render robot.glb -o robot_#.png --frames 3 --fps 2 {SMALL}"));
@@ -104,7 +102,7 @@ fn a_gltf_file_moves_in_the_window_and_dropped_files_open() {
     let pictures: std::collections::BTreeSet<Vec<u8>> = pictures.collect();
     assert_eq!(pictures.len(), 3, "each picture of the motion is another");
 
-    let mut view = View::open(&display, folder.path(), &format!("view robot.glb {OPTIONS} {COARSE}"));
+    let view = View::open(&display, folder.path(), &format!("view robot.glb {OPTIONS} {COARSE}"));
     // Once the first picture is there, another follows.
     for _ in 0..2 {
         let first = display.look(SIZE);
@@ -114,30 +112,7 @@ fn a_gltf_file_moves_in_the_window_and_dropped_files_open() {
             std::thread::sleep(Duration::from_millis(100));
         }
     }
-    view.key("space", "ToggleRunning");
-    let still = view.picture(SIZE);
     assert!(names(folder.path(), "toml").is_empty(), "no scene file was written");
-
-    // A dropped file that cannot be opened is a line in the window; the scene stays.
-    let bad = folder.path().join("bad.obj");
-    std::fs::write(&bad, "f 1 2 3\n").unwrap();
-    let window = view.window.parse().unwrap();
-    drop_file(&display.name, window, &bad, [200, 100]);
-    view.hears("message: not opened: ");
-    let told = view.picture(SIZE);
-    assert!(room::apart(&still[..480 * 200], &told[..480 * 200]) < 50, "the scene stays");
-    assert!(room::apart(&still, &told) > 500, "the line is seen");
-    // winit tells nothing of a file that does not exist.
-    drop_file(&display.name, window, &folder.path().join("missing.toml"), [200, 100]);
-    view.hears("message: not opened: what was dropped is no file");
-    // Another opens, and the window's title names it.
-    let scene = room::write(folder.path(), SIZE.map(|side| side as u32), "");
-    drop_file(&display.name, window, &scene, [200, 100]);
-    view.hears("message: opened ");
-    view.hears("the first picture");
-    let shown = view.picture(SIZE);
-    assert!(room::apart(&told, &shown) > 20_000, "the other scene is seen");
-    assert!(display.xdotool(&["getwindowname", &view.window.clone()]).contains("scene.toml"));
     view.close();
 }
 

@@ -1,7 +1,7 @@
 //! A window at its limits: its display goes away, or another program destroys it.
 
 use crate::display::Display;
-use crate::viewing::{SIZE, View, desk, open};
+use crate::viewing::{View, desk, open};
 use std::path::Path;
 
 /// A window whose first entity has lost or got its light, while the scene stands still or runs.
@@ -48,35 +48,4 @@ fn a_destroyed_window_saves_edits() {
         assert!(end.ends_with("; the edited scene was saved as scene-edited.toml"), "{end}");
         assert!(shadow_fields::scene::Scene::load(&folder.path().join("scene-edited.toml")).is_ok());
     }
-}
-
-/// Heaps of arenas that the C library has made for threads: each is 64 MB of addresses at a multiple of that, of which
-/// the first part can be written.
-fn thread_heaps(view: &View<'_>) -> Vec<String> {
-    const SIZE: u64 = 64 << 20;
-    let maps = std::fs::read_to_string(format!("/proc/{}/maps", view.child.0.id())).unwrap();
-    let of = |line: &str, access: &str| {
-        let words: Vec<&str> = line.split_whitespace().collect();
-        let (from, to) = words[0].split_once('-').expect("a range");
-        let address = |text| u64::from_str_radix(text, 16).expect("an address");
-        (words[1] == access && words.len() == 5).then_some([address(from), address(to)])
-    };
-    let lines: Vec<&str> = maps.lines().collect();
-    let is_heap = |at: &usize| {
-        let Some([from, middle]) = of(lines[*at], "rw-p") else { return false };
-        let rest = lines.get(at + 1).and_then(|next| of(next, "---p")).filter(|[next, _]| *next == middle);
-        from % SIZE == 0 && rest.map_or(middle, |[_, to]| to) % SIZE == 0
-    };
-    (0..lines.len()).filter(is_heap).map(|at| lines[at].to_owned()).collect()
-}
-
-/// Each arena would keep what its threads freed, for as long as the window is open.
-#[test]
-fn threads_have_no_memory_of_their_own() {
-    let Some((folder, display)) = desk() else { return };
-    let mut view = open(&display, folder.path());
-    view.key("g", "ToggleReference");
-    view.picture(SIZE);
-    assert_eq!(thread_heaps(&view), [""; 0]);
-    view.close();
 }

@@ -4,7 +4,6 @@ use crate::room::apart;
 use crate::stand::{SIZE, Stand};
 use shadow_fields::bake;
 use shadow_fields::draw::Antialias;
-use shadow_fields::error::Error;
 use shadow_fields::scene::{Lights, Scene};
 use shadow_fields::view::command::Command;
 use shadow_fields::view::input::{Button, Event, Key};
@@ -56,7 +55,6 @@ fn what_is_shown_is_what_render_makes_of_the_state() {
     follows(&mut stand, "exposure");
     stand.viewer.apply(Command::SetSky(0.5)).unwrap();
     follows(&mut stand, "the sky's strength");
-    stand.viewer.apply(Command::SetVariant(Some("storage"))).unwrap();
     stand.key(Key::Escape);
 
     // A light that was none: its field is baked in the background while the old picture stays.
@@ -295,30 +293,4 @@ fn changed_shaders_are_rebuilt_and_broken_ones_are_not_used() {
     write("merge_layout.glsl", &cone);
     stand.until("a good include", |viewer| viewer.shader_error().is_none());
     assert_eq!(apart(&plain, &stand.shown()), 0);
-}
-
-/// Whatever ends the window, edits are written first, to a file that did not exist, and the message says where.
-#[test]
-fn a_window_that_fails_saves_edits_first() {
-    let Some(mut stand) = Stand::new("rescue") else { return };
-    let lost = || Error::Device("vkQueueSubmit2 (frame): ERROR_DEVICE_LOST".into());
-    stand.viewer.apply(Command::Orbit([30.0, 10.0])).unwrap();
-    let quiet = stand.viewer.rescued(lost());
-    assert_eq!(quiet.to_string(), lost().to_string(), "nothing was edited");
-    assert!(!stand.cache.join("scene-edited.toml").exists());
-
-    for (name, ev) in [("scene-edited.toml", 0.5), ("scene-edited-2.toml", 1.0)] {
-        stand.letter('q');
-        stand.viewer.apply(Command::SetExposure(ev)).unwrap();
-        let told = stand.viewer.rescued(lost());
-        let path = stand.cache.join(name);
-        assert_eq!(told.exit_code(), 5);
-        assert_eq!(told.to_string(), format!("{}; the edited scene was saved as {}", lost(), path.display()));
-        let saved = Scene::load(&path).unwrap();
-        assert_eq!(saved.data.entities, stand.viewer.editor().scene().data.entities, "{name}");
-        assert_eq!(saved.data.output.exposure_ev(), ev, "{name}");
-        assert_eq!(&saved.data.camera, stand.viewer.editor().camera(), "{name}");
-        assert_eq!([saved.data.output.width, saved.data.output.height], SIZE);
-        assert_eq!(stand.viewer.rescued(lost()).to_string(), lost().to_string(), "it is saved now");
-    }
 }

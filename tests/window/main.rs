@@ -20,5 +20,3 @@ mod room;
 mod stand;
 #[cfg(target_os = "linux")]
 mod viewing;
-#[cfg(target_os = "linux")]
-mod xdnd;

@@ -4,7 +4,7 @@
 use super::{HEAD, parse, scenes};
 use crate::common::gpu;
 use shadow_fields::check::sharp as check;
-use shadow_fields::draw::{Antialias, Finish, Shading};
+use shadow_fields::draw::{Antialias, Shading};
 use shadow_fields::frame::{self, Frame};
 use shadow_fields::scene::{Lights, Scene};
 
@@ -59,7 +59,7 @@ fn edges_are_marked_where_pixels_read_them() {
     assert!(marks > 100 && none == 0, "{marks} vertices are marked for pixels, {none} where vertices evaluate");
     assert!(frame.still(&scene.at(0.0), 4.0).unwrap() == by_pixel, "a still picture");
     for (antialias, picture) in [(Antialias::Samples, &by_pixel), (Antialias::Outlines, &by_vertex)] {
-        frame.set_finish(Finish::Linear, antialias).unwrap();
+        frame.set_antialias(antialias).unwrap();
         assert!(show(&mut frame).0 == *picture, "{antialias:?}");
     }
 }

@@ -27,23 +27,19 @@ pub struct Arguments {
 
 #[derive(Subcommand)]
 enum What {
-    /// Split the error of pictures into its causes, sweep the settings, and compare with ray casting and shadow maps
+    /// Split the error of pictures into its causes, and compare with ray casting and shadow maps
     #[command(
         after_help = "Examples:\n  shadow-fields bench time-error --quick --output out/errors\n  shadow-fields bench time-error my_scene.toml \
-        --axis lattice --output out/my_scene\n  shadow-fields bench time-error --case torus --axis lattice --output out/torus"
+        --output out/my_scene\n  shadow-fields bench time-error --case torus --output out/torus"
     )]
     TimeError {
-        /// Scene file or glTF file to measure and sweep instead of the built-in cases, at the time_s of its [output]
+        /// Scene file or glTF file to measure instead of the built-in cases, at the time_s of its [output]
         #[arg(value_name = "SCENE", conflicts_with = "case")]
         scene: Option<PathBuf>,
-        /// Measure and sweep only cases that have TEXT in their names; may be given again; a text that none has lists
+        /// Measure only cases that have TEXT in their names; may be given again; a text that none has lists
         /// them
         #[arg(long, value_name = "TEXT")]
         case: Vec<String>,
-        /// Sweep only this axis, with all its settings (each may need bakes of its own); may be given again; an unknown
-        /// name lists them
-        #[arg(long, value_name = "NAME")]
-        axis: Vec<String>,
         #[command(flatten)]
         gltf: GltfSceneArguments,
         #[command(flatten)]
@@ -71,8 +67,7 @@ enum What {
 
 #[derive(Args)]
 struct RunArguments {
-    /// A minute on two cores instead of five, or a quarter of an hour for time-error: fewer and smaller scenes, settings
-    /// and rays
+    /// A minute on two cores instead of five, or a quarter of an hour for time-error: fewer and smaller scenes and rays
     #[arg(long)]
     quick: bool,
     /// Folder for the results as CSV and JSON, and for pictures
@@ -83,10 +78,10 @@ struct RunArguments {
 /// Runs a measurement.
 pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
     match &arguments.what {
-        What::TimeError { scene, case, axis, gltf, run } => {
+        What::TimeError { scene, case, gltf, run } => {
             let own = scene.as_deref().map(|path| own_case(global, gltf, path)).transpose()?;
             let inputs: Vec<PathBuf> = scene.iter().flat_map(|path| scene::files::of_scene(path)).collect();
-            let selection = Selection { scene: scene.clone(), cases: case.clone(), axes: axis.clone() };
+            let selection = Selection { scene: scene.clone(), cases: case.clone() };
             let measured = |bench: &Bench<'_>| time_error::run(bench, &run.out, &selection, own);
             measure(global, run, &inputs, measured, print_time_error)?;
         }
@@ -197,19 +192,6 @@ fn print_time_error(outcome: &TimeErrorOutcome) {
         ("map ms", "/map_ms_at_equal_rms"),
     ];
     table(&outcome.comparisons, &columns);
-    if !outcome.points.is_empty() {
-        output::say("\nSettings, one at a time round the default");
-        let columns = [
-            ("scene", "/case"),
-            ("axis", "/axis"),
-            ("setting", "/name"),
-            ("merge ms", "/merge_ms/median"),
-            ("over default", "/time_per_default_ratio"),
-            ("error", "/total/rms_relative"),
-            ("field bytes", "/field_bytes"),
-        ];
-        table(&outcome.points, &columns);
-    }
 }
 
 fn print_stability(outcome: &StabilityOutcome) {

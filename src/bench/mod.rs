@@ -17,7 +17,6 @@ pub mod scaling;
 pub mod shadow_map;
 pub mod skips;
 pub mod stability;
-pub mod sweep;
 pub mod time_error;
 pub mod town;
 pub mod trials;
@@ -27,6 +26,7 @@ use crate::bake::cache::Cache;
 use crate::bounce::Bounces;
 use crate::error::Result;
 use crate::frame::{self, Frame};
+use crate::gpu::Timing;
 use crate::scene::Scene;
 use serde_json::Value;
 
@@ -57,7 +57,12 @@ impl Bench<'_> {
     }
 }
 
-/// The options that sweeps vary: the program's defaults, with a picture so small that drawing costs nothing.
+/// Device time of the merge in milliseconds, sharp lights included.
+pub fn merge_ms(timings: &[Timing]) -> f64 {
+    timings.iter().filter(|t| ["merge", "sharp"].contains(&t.pass.as_str())).map(|t| t.milliseconds).sum()
+}
+
+/// The options that are measured: the program's defaults, with a picture so small that drawing costs nothing.
 pub fn default_options() -> frame::Options {
     // Frames are timed at rest: each must merge everything.
     let skip = crate::lists::skip::Skip::without("unmoved");

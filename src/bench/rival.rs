@@ -13,8 +13,7 @@ use super::cases::Case;
 use super::figures::{Radiosity, Spread, VertexDifference, along, crossing, spread};
 use super::judged::{Judged, JudgedAt, PIXEL_SIZE};
 use super::shadow_map::{Filter, ShadowMaps, maps_apply};
-use super::sweep;
-use super::{Bench, default_options};
+use super::{Bench, default_options, merge_ms};
 use crate::draw::Shading;
 use crate::error::Result;
 use crate::frame::{self, Frame};
@@ -154,7 +153,7 @@ impl Merged {
             let timings = self.frame.render(placements, white)?;
             if warm {
                 self.walls.push(started.elapsed().as_secs_f64() * 1e3);
-                self.merges.push(sweep::merge_ms(&timings));
+                self.merges.push(merge_ms(&timings));
             }
         }
         Ok(())

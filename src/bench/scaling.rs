@@ -2,9 +2,8 @@
 
 use super::budget::device_radiosity;
 use super::figures::{Radiosity, Spread, difference, rms, spread};
-use super::sweep::merge_ms;
 use super::town::{Town, moved};
-use super::{Bench, default_options};
+use super::{Bench, default_options, merge_ms};
 use crate::error::{Error, Result};
 use crate::frame::memory::Memory;
 use crate::frame::{self, Frame};

@@ -3,9 +3,8 @@
 use super::budget::device_radiosity;
 use super::cases::{self, Case};
 use super::figures::{Radiosity, Spread, VertexDifference, difference, rms, spread};
-use super::sweep::merge_ms;
 use super::town::{Town, moved};
-use super::{Bench, default_options, house};
+use super::{Bench, default_options, house, merge_ms};
 use crate::draw::Antialias;
 use crate::error::Result;
 use crate::frame::{self, Frame};

@@ -70,7 +70,7 @@ struct RunArguments {
     /// A minute on two cores instead of five, or a quarter of an hour for time-error: fewer and smaller scenes and rays
     #[arg(long)]
     quick: bool,
-    /// Folder for the results as CSV and JSON, and for pictures
+    /// Folder for the results as CSV and JSON
     #[arg(short, long = "output", alias = "out", value_name = "DIR")]
     out: PathBuf,
 }
@@ -174,9 +174,6 @@ fn print_time_error(outcome: &TimeErrorOutcome) {
         ("T0 error", "/t0_error_relative"),
     ];
     table(&outcome.budgets, &columns);
-    output::say("\nPictures against rays from pixels: mean FLIP and relative RMS error");
-    let columns = [("scene", "/case"), ("FLIP", "/pixels/mean_flip_ratio"), ("RMS", "/pixels/rms_relative")];
-    table(&outcome.pictures, &columns);
     output::say(
         "\nA frame, everything merged, against ray casting with as many threads at equal error, and the quickest shadow map that errs no \
          more\n(at vertices without drawing, at pixels with it)",

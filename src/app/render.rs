@@ -325,7 +325,6 @@ impl<'a> Rendering<'a> {
             "last_frame": last_frame,
             "memory_bytes": frame.map(Frame::memory),
             "device_bytes": frame.map(|frame| frame.memory().device()),
-            "truth": self.arguments.reference.then_some("pixels"),
             "reference_standard_error": self.arguments.reference.then_some(self.worst_error),
             "error": error,
             "options": {

@@ -10,7 +10,6 @@ pub mod ceilings;
 pub mod figures;
 pub mod house;
 pub mod judged;
-pub mod pictures;
 pub mod profile;
 pub mod rival;
 pub mod scaling;

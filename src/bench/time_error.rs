@@ -2,7 +2,6 @@
 
 use super::budget::{Budget, Effort, Truth, budget};
 use super::cases::{self, Case};
-use super::pictures::{CasePicture, pictures};
 use super::rival::{Comparison, compare};
 use super::{Bench, default_options};
 use crate::error::Result;
@@ -24,14 +23,11 @@ pub struct Selection {
 pub struct TimeErrorOutcome {
     /// One row per scene and light.
     pub budgets: Vec<Budget>,
-    /// One picture per scene and light.
-    pub pictures: Vec<CasePicture>,
     /// Rows of each case: at vertices and at pixels, and by every way to take the lights.
     pub comparisons: Vec<Comparison>,
 }
 
-/// Measures, and writes into `folder`: `budget.csv`, `rival.csv`, `time-error.json`, and two pictures a
-/// case. `own` is the case of the selected scene file.
+/// Measures, and writes into `folder`: `budget.csv`, `rival.csv` and `time-error.json`. `own` is the case of the selected scene file.
 pub fn run(bench: &Bench<'_>, folder: &Path, selection: &Selection, own: Option<Case>) -> Result<TimeErrorOutcome> {
     let cases = own.map_or_else(|| chosen(bench.quick, &selection.cases), |case| Ok(vec![case]))?;
     crate::text::make_folder(folder)?;
@@ -43,7 +39,6 @@ pub fn run(bench: &Bench<'_>, folder: &Path, selection: &Selection, own: Option<
         truth.check(case)?;
         outcome.budgets.push(budget(bench, case, &truth, default_options())?);
         (bench.progress)(&format!("{}: errors split into their causes", case.name));
-        outcome.pictures.push(pictures(bench, case, folder)?);
         outcome.comparisons.extend(compare(bench, case, &truth)?);
     }
     write_all(bench, folder, selection, &outcome)?;

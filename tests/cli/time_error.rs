@@ -16,7 +16,6 @@ fn one_case() {
     for name in ["budget.csv", "rival.csv", "time-error.json"] {
         assert!(written.iter().any(|found| found == name), "{name} among {written:?}");
     }
-    assert!(written.iter().any(|name| name.starts_with("error-") && name.ends_with(".png")), "an error picture");
     let document: Value = serde_json::from_slice(&folder.read("out/time-error.json")).unwrap();
     assert_eq!(printed["budgets"], document["outcome"]["budgets"]);
     let outcome = &document["outcome"];
@@ -41,7 +40,7 @@ fn one_case() {
     let script = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("scripts/measured");
     let Ok(tables) = std::process::Command::new(script).arg(&out).output() else { return };
     let tables = String::from_utf8(tables.stdout).unwrap();
-    for mark in ["budget", "vertices", "pixels", "pictures"] {
+    for mark in ["budget", "vertices", "pixels"] {
         let table =
             tables.split(&format!("<!-- measured: {mark} -->")).nth(1).unwrap_or_else(|| panic!("no {mark}: {tables}"));
         assert!(table.split("<!-- end -->").next().unwrap().contains("| teapot, (b) sky gradient"), "{mark}: {table}");
@@ -97,7 +96,7 @@ fn a_scene_of_ones_own() {
     let ran = finish(asked.arg("my ring.toml"));
     assert_eq!(ran.code, 0, "{}", ran.stderr);
     let outcome: Value = serde_json::from_str(&ran.stdout).unwrap();
-    for (part, count) in [("budgets", 1), ("pictures", 1), ("comparisons", 5)] {
+    for (part, count) in [("budgets", 1), ("comparisons", 5)] {
         assert_eq!(outcome[part].as_array().unwrap().len(), count, "{part}");
         assert_eq!(outcome[part][0]["case"], "my ring");
     }
@@ -123,8 +122,6 @@ fn a_scene_of_ones_own() {
     let cast: Vec<f64> = comparisons[2]["rival"].as_array().unwrap().iter().map(|p| rms(&p["error"])).collect();
     assert!(cast.windows(2).all(|pair| pair[1] < pair[0]) && cast[4] < 0.05, "{cast:?}");
     assert_eq!(comparisons[2]["maps"].as_array().unwrap().len(), 4);
-    let shown = rms(&outcome["pictures"][0]["pixels"]);
-    assert!((pixel / shown - 1.0).abs() < 0.3, "a sample of pixels, {pixel}, errs as all do, {shown}");
     assert!(sharp < 0.5 * sh && (sh / total - 1.0).abs() < 1e-6, "{sharp} and {sh} of {total}");
     assert!((rms(&outcome["budgets"][0]["sharp_total"]) / sharp - 1.0).abs() < 1e-6);
     // Shadow maps: a hard edge errs more than a soft one, and each has its time.
@@ -133,18 +130,6 @@ fn a_scene_of_ones_own() {
         maps.iter().map(|p| format!("{} {}", p["filter"].as_str().unwrap(), p["map_px"])).collect();
     assert_eq!(kinds, ["hard 512", "hard 2048", "pcss 512", "pcss 2048"]);
     assert!(rms(&maps[3]["error"]) < 0.9 * rms(&maps[1]["error"]), "{maps:?}");
-    let out = folder.at("out");
-    let written = names(&out);
-    let pixels = &outcome["pictures"][0]["pixels"];
-    assert!(pixels["lit_count"].as_u64().unwrap() > 10_000, "{pixels}");
-    let flip = pixels["mean_flip_ratio"].as_f64().unwrap();
-    assert!(rms(pixels) < 0.15 && flip > 0.0 && flip < 0.1, "{pixels}");
-    for name in ["pixels-my-ring.png", "error-my-ring.png"] {
-        assert!(written.iter().any(|found| found == name), "{name} among {written:?}");
-    }
-    let picture =
-        png::Decoder::new(std::io::BufReader::new(std::fs::File::open(out.join("pixels-my-ring.png")).unwrap()));
-    assert_eq!(picture.read_info().unwrap().info().size(), (720, 240));
     let document: Value = serde_json::from_slice(&folder.read("out/time-error.json")).unwrap();
     assert_eq!(document["origin"]["selection"]["scene"], "my ring.toml");
 }

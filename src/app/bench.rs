@@ -5,12 +5,12 @@ use super::source::GltfSceneArguments;
 use super::{Global, output, outputs};
 use crate::bench::cases::{self, Case};
 use crate::bench::stability::{self, NEAR_F16, NEAR_F32, StabilityOutcome};
-use crate::bench::time_error::{self, Selection, TimeErrorOutcome};
+use crate::bench::time_error::{self, TimeErrorOutcome};
 use crate::bench::trials::NEAR_TWIN;
 use crate::bench::{Bench, scaling, skips};
 use crate::error::{Error, Result};
 use crate::scene;
-use crate::text::three;
+use crate::text::{self, three};
 use crate::truth::exposure;
 use clap::{Args, Subcommand};
 use serde::Serialize;
@@ -70,7 +70,7 @@ struct RunArguments {
     /// A minute on two cores instead of five, or a quarter of an hour for time-error: fewer and smaller scenes and rays
     #[arg(long)]
     quick: bool,
-    /// Folder for the results as CSV and JSON
+    /// Folder for the results as JSON
     #[arg(short, long = "output", alias = "out", value_name = "DIR")]
     out: PathBuf,
 }
@@ -81,12 +81,12 @@ pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
         What::TimeError { scene, case, gltf, run } => {
             let own = scene.as_deref().map(|path| own_case(global, gltf, path)).transpose()?;
             let inputs: Vec<PathBuf> = scene.iter().flat_map(|path| scene::files::of_scene(path)).collect();
-            let selection = Selection { scene: scene.clone(), cases: case.clone() };
-            let measured = |bench: &Bench<'_>| time_error::run(bench, &run.out, &selection, own);
-            measure(global, run, &inputs, measured, print_time_error)?;
+            let cases = own.map_or_else(|| time_error::chosen(run.quick, case), |case| Ok(vec![case]))?;
+            let measured = |bench: &Bench<'_>| time_error::run(bench, &cases);
+            measure(global, run, "time-error", &inputs, measured, print_time_error)?;
         }
         What::Stability(run) => {
-            let outcome = measure(global, run, &[], |bench| stability::run(bench, &run.out), print_stability)?;
+            let outcome = measure(global, run, "stability", &[], stability::run, print_stability)?;
             let [failed, all] = outcome.failed();
             if failed > 0 {
                 return Err(Error::Failed(format!("{failed} of {all} trials failed")));
@@ -94,20 +94,21 @@ pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
         }
         What::Skip { case, run } => {
             let scenes = cases::named(skips::all(run.quick)?, case)?;
-            measure(global, run, &[], |bench| skips::run(bench, &run.out, &scenes), |rows| print_skips(rows))?;
+            measure(global, run, "skip", &[], |bench| skips::run(bench, &scenes), |rows| print_skips(rows))?;
         }
         What::Scaling { axis, run } => {
-            measure(global, run, &[], |bench| scaling::run(bench, &run.out, axis), |points| print_scaling(points))?;
+            measure(global, run, "scaling", &[], |bench| scaling::run(bench, axis), |points| print_scaling(points))?;
         }
     }
     Ok(())
 }
 
-/// Opens the device, measures with progress on stderr, and prints the outcome: as JSON, or the tables that `print` makes
-/// of it. The folder of results must not hold any of the inputs.
+/// Opens the device, measures with progress on stderr, writes the outcome as NAME.json, and prints it: as JSON, or the
+/// tables that `print` makes of it. The folder of results must not hold any of the inputs.
 fn measure<T: Serialize>(
     global: &Global,
     run: &RunArguments,
+    name: &str,
     inputs: &[PathBuf],
     measured: impl FnOnce(&Bench<'_>) -> Result<T>,
     print: impl FnOnce(&T),
@@ -121,8 +122,11 @@ fn measure<T: Serialize>(
         }
     };
     let outcome = measured(&bench(&context, global, run.quick, &show))?;
+    let document = json!({ "origin": context.origin(global), "quick": run.quick, "outcome": outcome });
+    text::make_folder(&run.out)?;
+    text::write(&run.out.join(format!("{name}.json")), format!("{document:#}\n"))?;
     if global.json {
-        output::say(json!(outcome).to_string());
+        output::say(document["outcome"].to_string());
     } else {
         print(&outcome);
     }
@@ -132,8 +136,7 @@ fn measure<T: Serialize>(
 
 /// The measurements' view of an open device.
 pub fn bench<'b>(context: &'b Context, global: &Global, quick: bool, progress: &'b dyn Fn(&str)) -> Bench<'b> {
-    let origin = context.origin(global);
-    Bench { baker: &context.baker, cache: &context.cache, progress, quick, seed: global.seed, origin }
+    Bench { baker: &context.baker, cache: &context.cache, progress, quick, seed: global.seed }
 }
 
 /// The case of a scene file.

@@ -36,7 +36,7 @@ pub struct Arguments {
     /// Number of timed runs of each, after one that warms up
     #[arg(long, default_value_t = 15, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=10_000))]
     runs: u32,
-    /// Write profile.csv and profile.json into this folder
+    /// Write profile.json into this folder
     #[arg(short, long = "output", alias = "out", value_name = "DIR")]
     out: Option<PathBuf>,
 }
@@ -74,7 +74,6 @@ pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
     });
     if let Some(folder) = &arguments.out {
         text::make_folder(folder)?;
-        text::write(&folder.join("profile.csv"), text::csv(&document["origin"], &rows))?;
         text::write(&folder.join("profile.json"), format!("{document:#}\n"))?;
     }
     if global.json {

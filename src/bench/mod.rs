@@ -1,7 +1,7 @@
 //! Measurements behind the figures in the documentation: what a picture's error is made of, what run time buys, and
 //! what keeps the numbers bounded. `docs/measured.md` has the results.
 
-// Fields of rows of results are keys of CSV and JSON; what their names say needs no comment.
+// Fields of rows of results are keys of JSON; what their names say needs no comment.
 #![allow(missing_docs)]
 
 pub mod budget;
@@ -27,7 +27,6 @@ use crate::error::Result;
 use crate::frame::{self, Frame};
 use crate::gpu::Timing;
 use crate::scene::Scene;
-use serde_json::Value;
 
 /// Shared input of all measurements.
 #[derive(Clone)]
@@ -42,8 +41,6 @@ pub struct Bench<'b> {
     pub quick: bool,
     /// Seed of vertices and rays.
     pub seed: u64,
-    /// Device, driver, version, options and revision, for the head of every result file.
-    pub origin: Value,
 }
 
 impl Bench<'_> {

@@ -10,11 +10,8 @@ use crate::frame::{self, Frame};
 use crate::lists::gather::Counts;
 use crate::lists::skip::Skip;
 use crate::scene::Placement;
-use crate::text::write_rows;
 use crate::truth::{RayCast, RayMeshes, World, sample_vertices};
 use serde::Serialize;
-use serde_json::json;
-use std::path::Path;
 use std::time::Instant;
 
 /// Measurements at one size along one axis.
@@ -52,23 +49,20 @@ pub struct ScalingPoint {
     pub resident_bytes: Option<u64>,
 }
 
-/// Measures the `chosen` axes (all if empty), and writes `scaling.csv` and `scaling.json` into `folder`.
-pub fn run(bench: &Bench<'_>, folder: &Path, chosen: &[String]) -> Result<Vec<ScalingPoint>> {
+/// Measures the `chosen` axes (all if empty).
+pub fn run(bench: &Bench<'_>, chosen: &[String]) -> Result<Vec<ScalingPoint>> {
     let mut axes = axes(bench.quick);
     if let Some(name) = chosen.iter().find(|name| !axes.iter().any(|(axis, _)| axis == name)) {
         let names: Vec<&str> = axes.iter().map(|(axis, _)| *axis).collect();
         return Err(Error::Usage(format!("unknown axis \"{name}\" ({})", names.join(", "))));
     }
     axes.retain(|(axis, _)| chosen.is_empty() || chosen.iter().any(|name| name == axis));
-    crate::text::make_folder(folder)?;
     let mut points = Vec::new();
     for (axis, towns) in &axes {
         for &town in towns {
             points.push(point(bench, axis, town)?);
         }
     }
-    let origin = json!({ "origin": bench.origin, "quick": bench.quick });
-    write_rows(folder, "scaling", &origin, &points)?;
     Ok(points)
 }
 

@@ -14,8 +14,6 @@ use crate::scene::{Placement, Scene};
 use crate::truth::raycast::{Distant, relative_error};
 use crate::truth::{RayCast, RayMeshes, Vertex, World, sample_vertices};
 use serde::Serialize;
-use serde_json::json;
-use std::path::Path;
 use std::time::Instant;
 
 /// A frame without drawing, with the skip off or on.
@@ -94,18 +92,12 @@ fn left_off(name: &str, counts: &Counts) -> Option<u64> {
     }
 }
 
-/// Measures every skip in some cases, and writes `skip.csv` and `skip.json` into `folder`.
-pub fn run(bench: &Bench<'_>, folder: &Path, cases: &[Case]) -> Result<Vec<SkipCost>> {
-    crate::text::make_folder(folder)?;
+/// Measures every skip in some cases.
+pub fn run(bench: &Bench<'_>, cases: &[Case]) -> Result<Vec<SkipCost>> {
     let mut rows = Vec::new();
     for case in cases {
         rows.extend(of_case(bench, case)?);
     }
-    let origin = json!({
-        "origin": bench.origin, "quick": bench.quick, "seed": bench.seed,
-        "errors": "relative to the root mean square of T0 over the judged vertices",
-    });
-    crate::text::write_rows(folder, "skip", &origin, &rows)?;
     Ok(rows)
 }
 

@@ -10,13 +10,10 @@ use crate::sh::basis::MAX_COEFFICIENTS;
 use crate::sh::lobe::{cap, clamped_cosine};
 use crate::sh::product::Tensor;
 use crate::sh::quadrature::sphere_rule;
-use crate::text::{csv, write};
 use glam::DVec3;
 use half::f16;
 use serde::Serialize;
-use serde_json::json;
 use std::f64::consts::PI;
-use std::path::Path;
 use std::sync::LazyLock;
 
 /// Bands of the transfer in all chains.
@@ -160,9 +157,8 @@ pub fn chains(seed: u64, longest: usize) -> Vec<CapChain> {
     out
 }
 
-/// Runs all tests, and writes `chains.csv`, `trials.csv` and `stability.json` into `folder`.
-pub fn run(bench: &Bench<'_>, folder: &Path) -> Result<StabilityOutcome> {
-    crate::text::make_folder(folder)?;
+/// Runs all tests.
+pub fn run(bench: &Bench<'_>) -> Result<StabilityOutcome> {
     (bench.progress)("chains of caps");
     let chains = chains(bench.seed, if bench.quick { 64 } else { 1000 });
     let mut trials = Vec::new();
@@ -175,12 +171,7 @@ pub fn run(bench: &Bench<'_>, folder: &Path) -> Result<StabilityOutcome> {
         }
         (bench.progress)(&case.name);
     }
-    let origin = json!({ "origin": bench.origin, "quick": bench.quick, "seed": bench.seed });
-    let outcome = StabilityOutcome { chains, trials };
-    write(&folder.join("chains.csv"), csv(&origin, &outcome.chains))?;
-    write(&folder.join("trials.csv"), csv(&origin, &outcome.trials))?;
-    write(&folder.join("stability.json"), format!("{:#}\n", json!({ "origin": origin, "outcome": outcome })))?;
-    Ok(outcome)
+    Ok(StabilityOutcome { chains, trials })
 }
 
 #[cfg(test)]

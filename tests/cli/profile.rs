@@ -58,7 +58,7 @@ fn two_variants_side_by_side() {
         positive(row, &["/work/flops"]);
         assert_eq!(row["work"]["fetches"].as_u64().unwrap() > 0, name == "texel-packed");
     }
-    assert_eq!(names(&folder.at("out")), ["profile.csv", "profile.json"]);
+    assert_eq!(names(&folder.at("out")), ["profile.json"]);
 }
 
 /// A floor under a uniform sky.

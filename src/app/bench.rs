@@ -230,8 +230,8 @@ fn print_stability(outcome: &StabilityOutcome) {
 
 fn print_skips(rows: &[skips::SkipCost]) {
     output::say(
-        "Times of a frame without drawing, in turns without and with the skip (for \"hidden\" with drawing, at 1280x720). Left off: \
-         entries of\nlists (for \"hidden\": clusters). Errors and changes are relative to the RMS radiosity.",
+        "Times of a frame without drawing, in turns without and with the skip (for \"hidden\" with drawing, at 1280x720).\nErrors \
+         and changes are relative to the RMS radiosity.",
     );
     let columns = [
         ("scene", "/case"),
@@ -239,7 +239,6 @@ fn print_skips(rows: &[skips::SkipCost]) {
         ("off ms", "/off/frame_ms/median"),
         ("on ms", "/on/frame_ms/median"),
         ("times faster", "/speed_up_ratio"),
-        ("left off", "/left_off_count"),
         ("off lookups", "/off/entry_count"),
         ("on lookups", "/on/entry_count"),
         ("off error", "/off/error/rms_relative"),

@@ -321,7 +321,6 @@ impl<'a> Rendering<'a> {
             "receiver_vertices": frame.map(Frame::receiver_vertex_count),
             "variant": frame.map(|frame| frame.variant().name),
             "lights": self.lights(),
-            "lookups": frame.map(|frame| frame.counts(&self.last())),
             "last_frame": last_frame,
             "memory_bytes": frame.map(Frame::memory),
             "device_bytes": frame.map(|frame| frame.memory().device()),

@@ -7,7 +7,6 @@ use super::{Bench, default_options, merge_ms};
 use crate::error::{Error, Result};
 use crate::frame::memory::Memory;
 use crate::frame::{self, Frame};
-use crate::lists::gather::Counts;
 use crate::lists::skip::Skip;
 use crate::scene::Placement;
 use crate::truth::{RayCast, RayMeshes, World, sample_vertices};
@@ -37,8 +36,6 @@ pub struct ScalingPoint {
     pub rest_ms: Spread,
     /// Lookups per vertex.
     pub entries_a_vertex: f64,
-    /// Lookups that the lists skip.
-    pub counts: Counts,
     /// Relative root mean square error of a sample of vertices against ray casting.
     pub error: f64,
     /// Device memory and lists, bytes.
@@ -153,7 +150,6 @@ fn point(bench: &Bench<'_>, axis: &'static str, town: Town) -> Result<ScalingPoi
         one_moves_ms: spread(&one),
         rest_ms: spread(&rest),
         entries_a_vertex,
-        counts: frame.counts(&placements),
         error: error(bench, &mut frame, &placements)?,
         memory_bytes: frame.memory(),
         device_bytes: frame.memory().device(),

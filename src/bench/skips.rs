@@ -8,7 +8,6 @@ use super::{Bench, default_options, house, merge_ms};
 use crate::draw::Antialias;
 use crate::error::Result;
 use crate::frame::{self, Frame};
-use crate::lists::gather::Counts;
 use crate::lists::skip::{EPS, Skip};
 use crate::scene::{Placement, Scene};
 use crate::truth::raycast::{Distant, relative_error};
@@ -45,11 +44,6 @@ pub struct SkipCost {
     pub times_faster: f64,
     /// Largest change of a vertex, relative to the root mean square of T0.
     pub change: VertexDifference,
-    /// Lookups that the lists leave off, all skips on.
-    pub counts: Counts,
-    /// Lookups that this skip left off: (cluster, chain, entity) triples, a cluster being 64 vertices. `None` where it
-    /// does not work on lists.
-    pub left_off_count: Option<u64>,
 }
 
 /// Motion of the scene while a skip is timed.
@@ -75,22 +69,6 @@ const TIMED: [(&str, Motion); 9] = [
     ("unmoved", Motion::OneMoves),
     ("hidden", Motion::AllMove),
 ];
-
-/// The number of entries that a skip left off the lists; `None` where it does not work on lists.
-fn left_off(name: &str, counts: &Counts) -> Option<u64> {
-    match name {
-        "horizon" => Some(counts.below_horizon),
-        "cones" => Some(counts.apart),
-        "behind" => Some(counts.behind_light),
-        "caps" => Some(counts.caps),
-        "passed" => Some(counts.passed_by),
-        "covered" => Some(counts.covered),
-        "static" => Some(counts.own),
-        "hidden" => Some(counts.hidden),
-        "eps" => Some(counts.below_eps),
-        _ => None,
-    }
-}
 
 /// Measures every skip in some cases.
 pub fn run(bench: &Bench<'_>, cases: &[Case]) -> Result<Vec<SkipCost>> {
@@ -142,14 +120,14 @@ fn of_case(bench: &Bench<'_>, case: &Case) -> Result<Vec<SkipCost>> {
         };
         let mut off = base;
         *off.skip.switch(name).expect("a skip with a switch") = false;
-        rows.push(judge.row(bench, case, &placements, [name, &what], [off, base], motion)?);
+        rows.push(judge.row(bench, case, &placements, &what, [off, base], motion)?);
     }
     let what = format!("eps {EPS}");
     let without_eps = frame::Options { eps: 0.0, ..at_rest };
-    rows.push(judge.row(bench, case, &placements, ["eps", &what], [without_eps, at_rest], Motion::AtRest)?);
+    rows.push(judge.row(bench, case, &placements, &what, [without_eps, at_rest], Motion::AtRest)?);
     let none = frame::Options { eps: 0.0, skip: Skip::NONE, ..at_rest };
     let what = "all but unmoved";
-    rows.push(judge.row(bench, case, &placements, [what, what], [none, at_rest], Motion::AtRest)?);
+    rows.push(judge.row(bench, case, &placements, what, [none, at_rest], Motion::AtRest)?);
     Ok(rows)
 }
 
@@ -214,7 +192,7 @@ impl Judge {
         bench: &Bench<'_>,
         case: &Case,
         placements: &[Placement],
-        [name, what]: [&str; 2],
+        what: &str,
         [off, on]: [frame::Options; 2],
         motion: Motion,
     ) -> Result<SkipCost> {
@@ -236,7 +214,6 @@ impl Judge {
         };
         let off = side(0);
         let on = side(1);
-        let counts = frames[1].counts(placements);
         (bench.progress)(&format!("{}: {what} measured", case.name));
         Ok(SkipCost {
             case: case.name.clone(),
@@ -244,8 +221,6 @@ impl Judge {
             vertices: frames[0].receiver_vertex_count(),
             times_faster: off.frame_ms.median / on.frame_ms.median,
             change: difference(&found[0], &found[1], self.unit),
-            left_off_count: left_off(name, &counts),
-            counts,
             off,
             on,
         })

@@ -8,7 +8,6 @@ use crate::lists::sight::{self, Sight};
 use crate::scene::Placement;
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
-use std::ops::Range;
 
 /// Which radiosity a viewport shows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -48,19 +47,6 @@ impl Frame {
     pub(super) fn whole(&self) -> Viewport {
         let [width, height] = self.options.size;
         Viewport::merged([0, 0, width, height])
-    }
-
-    /// Clusters that the camera does not see in the whole picture.
-    pub(super) fn hidden_count(&self, placements: &[Placement]) -> usize {
-        let sights = self.sights(placements, &[self.whole()]);
-        sights.map_or(0, |sights| self.work.lists.hidden_count(&sights))
-    }
-
-    /// Triangles that the whole picture leaves out.
-    pub(super) fn undrawn_count(&self, placements: &[Placement]) -> usize {
-        let count = |indices: Vec<Range<u32>>| indices.iter().map(|range| range.len() / 3).sum::<usize>();
-        let drawn = self.drawn_entities(placements, self.options.size);
-        drawn.into_iter().map(|entity| count(entity.mesh.seen(None)) - count(entity.indices)).sum()
     }
 
     /// The camera for a viewport of `size` pixels.

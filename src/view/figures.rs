@@ -43,24 +43,8 @@ pub(super) fn figures(ui: &mut Ui, editor: &Editor, status: &Status<'_>, command
 fn details(ui: &mut Ui, editor: &Editor, status: &Status<'_>, commands: &mut Vec<Command>) {
     ui.label(RichText::new(status.device).strong());
     ui.label(RichText::new(status.driver).small());
-    if let Some(counts) = status.counts {
-        let entities = editor.scene().entities.len();
-        ui.label(format!("{entities} entities, {} lit vertices", grouped(status.vertices as u64)));
-        let of = |count: u64| 100.0 * count as f64 / counts.considered.max(1) as f64;
-        ui.label(format!("lookups considered {}, skipped {:.0} %", grouped(counts.considered), of(counts.skipped())));
-        let small = format!(
-            "a lookup: a cluster x a product chain x an entity; behind light {:.0} %, horizon {:.0} %, apart {:.0} %, away {:.0} %, \
-             eps {:.0} %, passed {:.0} %, covered {:.0} %",
-            of(counts.behind_light),
-            of(counts.below_horizon),
-            of(counts.apart),
-            of(counts.facing_away),
-            of(counts.below_eps),
-            of(counts.passed_by),
-            of(counts.covered)
-        );
-        ui.label(RichText::new(small).small());
-    }
+    let entities = editor.scene().entities.len();
+    ui.label(format!("{entities} entities, {} lit vertices", grouped(status.vertices as u64)));
     if let Some((merged, all)) = status.merged {
         ui.label(format!("clusters merged again {} of {}", grouped(merged as u64), grouped(all as u64)));
     }

@@ -31,7 +31,6 @@ impl Viewer {
             self.reference = None;
             self.error_shown = None;
             self.rays = None;
-            self.counts = None;
             self.edges.clear();
             self.timings.clear();
             self.outgrown = true;

@@ -2,7 +2,6 @@
 
 use super::task::TaskProgress;
 use crate::gpu::Timing;
-use crate::lists::gather::Counts;
 use crate::scene::Lights;
 use egui::Color32;
 use std::collections::VecDeque;
@@ -36,8 +35,6 @@ pub struct Status<'s> {
     pub refined: Option<bool>,
     /// Times of the passes of the last frames, oldest first.
     pub timings: &'s VecDeque<Vec<Timing>>,
-    /// Lookups of the last merge.
-    pub counts: Option<Counts>,
     /// Number of clusters that the last frame merged, and of all clusters; `None` before the first frame of a scene.
     pub merged: Option<(usize, usize)>,
     /// Number of lit vertices.

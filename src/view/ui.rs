@@ -42,7 +42,6 @@ impl Viewer {
             size: self.size,
             refined: self.setup.refines.then(|| self.is_refined()),
             timings: &self.timings,
-            counts: self.counts.as_ref().map(|(_, counts)| *counts),
             merged: self.frame.as_ref().map(|f| (f.merged().merged_clusters, f.merged().clusters)),
             vertices: self.frame.as_ref().map_or(0, Frame::receiver_vertex_count),
             lights: self.setup.frame.lights,

@@ -19,7 +19,6 @@ use crate::draw::show::Show;
 use crate::error::{Error, Result};
 use crate::frame::{self, Frame};
 use crate::gpu::{self, Device, Flight, Timing};
-use crate::lists::gather::Counts;
 use crate::shaders::Library;
 use ash::vk;
 use std::collections::{HashMap, VecDeque};
@@ -114,10 +113,6 @@ pub struct Viewer {
     pub(super) repaint_at: Option<Instant>,
     /// The progress that was shown last.
     pub(super) told: [Option<TaskProgress>; 2],
-    /// Version of the light, and the lookups that its lists skip.
-    pub(super) counts: Option<(u64, Counts)>,
-    /// Time of the next count, which is limited because it visits every cluster and entity.
-    pub(super) count_at: Instant,
     pub(super) frame_count: u64,
     pub(super) build_count: u64,
     /// Frames that were drawn before the last build, until what that freed is given back.
@@ -161,8 +156,6 @@ impl Viewer {
             pace: Pace::default(),
             repaint_at: Some(Instant::now()),
             told: [None, None],
-            counts: None,
-            count_at: Instant::now(),
             frame_count: 0,
             build_count: 0,
             drawn_before: None,
@@ -343,24 +336,11 @@ impl Viewer {
             }
         }
         self.preview()?;
-        self.count();
         let files = self.watch.as_mut().and_then(Watch::poll);
         if let Some(files) = files {
             self.reload(&files);
         }
         self.look_at_rays()
-    }
-
-    /// Counts the lookups that lists skip, if unknown, in at most a twentieth of the time.
-    fn count(&mut self) {
-        let Some(frame) = &self.frame else { return };
-        let known = self.counts.as_ref().is_some_and(|(version, _)| *version == self.version);
-        if !known && self.editor.overlay && Instant::now() >= self.count_at {
-            let start = Instant::now();
-            self.counts = Some((self.version, frame.counts(&self.editor.placements())));
-            self.count_at = Instant::now() + (20 * start.elapsed()).max(Duration::from_millis(500));
-            self.pending.display = true;
-        }
     }
 
     /// Size of the viewport that shows the merged picture: the window's left half beside a reference.

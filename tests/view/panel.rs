@@ -3,7 +3,6 @@
 
 use egui::{Context, Event, Id, PointerButton, Pos2, Rect, pos2};
 use shadow_fields::gpu::Timing;
-use shadow_fields::lists::gather::Counts;
 use shadow_fields::view::panel::{show, style};
 use shadow_fields::view::status::{ErrorScale, Status};
 use shadow_fields::view::task::TaskProgress;
@@ -54,7 +53,6 @@ impl Stand {
             size: [1280, 720],
             refined: Some(true),
             timings: &timings,
-            counts: Some(Counts { considered: 123_456, ..Counts::default() }),
             merged: Some((1234, 5678)),
             vertices: 70_269,
             lights: Default::default(),

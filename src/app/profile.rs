@@ -92,13 +92,9 @@ pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
         ("lower", "/ms/lower"),
         ("upper", "/ms/upper"),
         ("ns/pair", "/ns_a_pair"),
-        ("flops", "/work/flops"),
-        ("texels", "/work/fetches"),
-        ("bytes", "/work/bytes"),
+        ("flops", "/flops"),
         ("GFLOP/s", "/gflops"),
-        ("GB/s", "/gb_s"),
         ("arithmetic's share", "/arithmetic_share"),
-        ("reads' share", "/read_share"),
     ];
     table(&rows, &columns);
     if rows.iter().any(|row| row.pass == "merge" && row.ns_a_pair.is_none()) {

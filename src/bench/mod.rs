@@ -8,7 +8,6 @@ pub mod budget;
 pub mod cases;
 pub mod ceilings;
 pub mod figures;
-pub mod house;
 pub mod judged;
 pub mod profile;
 pub mod rival;

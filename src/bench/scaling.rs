@@ -1,7 +1,7 @@
 //! `bench scaling`: time and memory of a frame as vertices, entities and lights increase.
 
-use super::budget::device_radiosity;
-use super::figures::{Radiosity, Spread, difference, rms, spread};
+use super::budget::{Reference, device_radiosity};
+use super::figures::{Spread, spread};
 use super::town::{Town, moved};
 use super::{Bench, default_options, merge_ms};
 use crate::error::{Error, Result};
@@ -9,7 +9,7 @@ use crate::frame::memory::Memory;
 use crate::frame::{self, Frame};
 use crate::lists::skip::Skip;
 use crate::scene::Placement;
-use crate::truth::{RayCast, RayMeshes, World, sample_vertices};
+use crate::truth::{RayCast, RayMeshes, World};
 use serde::Serialize;
 use std::time::Instant;
 
@@ -89,12 +89,11 @@ fn axes(quick: bool) -> Vec<(&'static str, Vec<Town>)> {
 fn error(bench: &Bench<'_>, frame: &mut Frame, placements: &[Placement]) -> Result<f64> {
     let scene = frame.scene().clone();
     let shapes = RayMeshes::new(&scene);
-    let vertices = sample_vertices(&scene, if bench.quick { 64 } else { 256 }, bench.seed);
+    let world = World::new(&scene, &shapes, placements);
     let cast = RayCast { rays: if bench.quick { 256 } else { 1024 }, seed: bench.seed, ..Default::default() };
-    let lit = cast.run(&World::new(&scene, &shapes, placements), &vertices);
-    let truth: Vec<Radiosity> = lit.iter().map(|e| e.radiosity).collect();
+    let reference = Reference::new(&world, if bench.quick { 64 } else { 256 }, &cast);
     frame.render(placements, None)?;
-    Ok(difference(&device_radiosity(frame, &vertices)?, &truth, rms(&truth).max(f64::MIN_POSITIVE)).rms)
+    Ok(reference.error(&device_radiosity(frame, &reference.vertices)?).rms)
 }
 
 fn point(bench: &Bench<'_>, axis: &'static str, town: Town) -> Result<ScalingPoint> {

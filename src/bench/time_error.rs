@@ -25,7 +25,7 @@ pub fn run(bench: &Bench<'_>, cases: &[Case]) -> Result<TimeErrorOutcome> {
         truth.check(case)?;
         outcome.budgets.push(budget(bench, case, &truth, default_options())?);
         (bench.progress)(&format!("{}: errors split into their causes", case.name));
-        outcome.comparisons.extend(compare(bench, case, &truth)?);
+        outcome.comparisons.extend(compare(bench, case, &truth.reference)?);
     }
     Ok(outcome)
 }

@@ -4,7 +4,7 @@ use super::context::Context;
 use super::source::GltfSceneArguments;
 use super::{Global, output, outputs};
 use crate::bench::cases::{self, Case};
-use crate::bench::stability::{self, NEAR_F16, NEAR_F32, StabilityOutcome};
+use crate::bench::stability::{self, NEAR_F16, StabilityOutcome};
 use crate::bench::time_error::{self, TimeErrorOutcome};
 use crate::bench::trials::NEAR_TWIN;
 use crate::bench::{Bench, scaling, skips};
@@ -196,8 +196,8 @@ fn print_time_error(outcome: &TimeErrorOutcome) {
 
 fn print_stability(outcome: &StabilityOutcome) {
     output::say(format!(
-        "Irradiance behind chains of caps (1 where nothing blocks). A guarded chain stays from 0 to 1, in f32 within \
-         {NEAR_F32:e} of f64,\nwith factors in f16 within {NEAR_F16:e}; 7 bands of visibility are not guarded"
+        "Irradiance behind chains of caps (1 where nothing blocks). A guarded chain stays from 0 to 1, with factors in f16 \
+         within {NEAR_F16:e}"
     ));
     let columns = [
         ("caps", "/caps"),
@@ -205,9 +205,7 @@ fn print_stability(outcome: &StabilityOutcome) {
         ("truth", "/truth_relative"),
         ("plain", "/plain_relative"),
         ("guarded", "/guarded_relative"),
-        ("f32", "/guarded_f32_relative"),
         ("f16", "/guarded_f16_relative"),
-        ("7 bands", "/plain_7_bands_relative"),
         ("passed", "/passed"),
     ];
     table(&outcome.chains, &columns);

@@ -18,7 +18,6 @@ use glam::Vec3;
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 
-/// Arguments of `bake`.
 #[derive(Args)]
 #[command(after_help = "Examples:\n  shadow-fields bake assets/meshes/teapot.obj -o teapot.sf\n  \
     shadow-fields bake lamp.obj -o lamp.sf --radiance 4,3,2 --quality high")]
@@ -55,7 +54,6 @@ impl Arguments {
     }
 }
 
-/// Parses a radiance.
 fn color(text: &str) -> std::result::Result<Vec3, String> {
     triple(number(0.0..=RADIANCE_LIMIT))(text).map(Vec3::from_array)
 }

@@ -18,7 +18,6 @@ use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-/// Arguments of `bench`.
 #[derive(Args)]
 pub struct Arguments {
     #[command(subcommand)]
@@ -75,7 +74,6 @@ struct RunArguments {
     out: PathBuf,
 }
 
-/// Runs a measurement.
 pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
     match &arguments.what {
         What::TimeError { scene, case, gltf, run } => {

@@ -6,7 +6,6 @@ use crate::check;
 use crate::error::{Error, Result};
 use clap::Args;
 
-/// Arguments of `check`.
 #[derive(Args)]
 pub struct Arguments {
     /// Only these passes

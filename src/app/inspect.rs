@@ -16,7 +16,6 @@ use glam::DVec3;
 use serde_json::{Value, json};
 use std::path::PathBuf;
 
-/// Arguments of `inspect`.
 #[derive(Args)]
 #[command(
     after_help = "Examples:\n  shadow-fields inspect teapot.sf\n  shadow-fields inspect teapot.sf --at 0,1.5,2\n  \
@@ -58,7 +57,6 @@ struct About {
     sheet: Option<Sheet>,
 }
 
-/// Shows a field.
 pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
     if let Some(path) = &arguments.faces {
         Outputs::check(std::slice::from_ref(&arguments.field), &[Output::new("--faces", path, "png")])?;

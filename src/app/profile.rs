@@ -16,7 +16,6 @@ use clap::Args;
 use serde_json::json;
 use std::path::PathBuf;
 
-/// Arguments of `profile`.
 #[derive(Args)]
 pub struct Arguments {
     /// Scene file, or the name of a built-in scene, whose passes are timed; without one a made-up merge of known size
@@ -41,7 +40,6 @@ pub struct Arguments {
     out: Option<PathBuf>,
 }
 
-/// Measures and prints.
 pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
     let inputs: Vec<PathBuf> = arguments.scene.iter().flat_map(|path| scene::files::of_scene(path)).collect();
     if let Some(folder) = &arguments.out {

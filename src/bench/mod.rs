@@ -17,7 +17,6 @@ pub mod skips;
 pub mod stability;
 pub mod time_error;
 pub mod town;
-pub mod trials;
 
 use crate::bake::Baker;
 use crate::bake::cache::Cache;

@@ -5,7 +5,6 @@ use super::figures::{Spread, spread};
 use super::town::{Town, moved};
 use super::{Bench, default_options, merge_ms};
 use crate::error::{Error, Result};
-use crate::frame::memory::Memory;
 use crate::frame::{self, Frame};
 use crate::lists::skip::Skip;
 use crate::scene::Placement;
@@ -38,12 +37,7 @@ pub struct ScalingPoint {
     pub entries_a_vertex: f64,
     /// Relative root mean square error of a sample of vertices against ray casting.
     pub error: f64,
-    /// Device memory and lists, bytes.
-    pub memory_bytes: Memory,
     pub device_bytes: u64,
-    /// Resident memory of the process in bytes, if the system reports it. On a software device it includes device
-    /// memory.
-    pub resident_bytes: Option<u64>,
 }
 
 /// Measures the `chosen` axes (all if empty).
@@ -135,8 +129,6 @@ fn point(bench: &Bench<'_>, axis: &'static str, town: Town) -> Result<ScalingPoi
     })?;
     let (rest, _) = timed(&mut frame, &|_| placements.clone())?;
     let merge_ms = spread(&merges);
-    // This is read before ray casting, which needs memory of its own.
-    let resident_bytes = resident_bytes();
     (bench.progress)(&format!("{axis}: {vertices} vertices, {} entities measured", scene.entities.len()));
     Ok(ScalingPoint {
         axis,
@@ -150,15 +142,6 @@ fn point(bench: &Bench<'_>, axis: &'static str, town: Town) -> Result<ScalingPoi
         rest_ms: spread(&rest),
         entries_a_vertex,
         error: error(bench, &mut frame, &placements)?,
-        memory_bytes: frame.memory(),
         device_bytes: frame.memory().device(),
-        resident_bytes,
     })
-}
-
-/// Resident memory of this process, where the system has a file that tells.
-fn resident_bytes() -> Option<u64> {
-    let status = std::fs::read_to_string("/proc/self/status").ok()?;
-    let line = status.lines().find_map(|line| line.strip_prefix("VmRSS:"))?;
-    Some(line.trim().trim_end_matches(" kB").trim().parse::<u64>().ok()? * 1024)
 }

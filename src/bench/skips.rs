@@ -27,7 +27,6 @@ pub struct Side {
     pub entries: usize,
     /// Against ray casting.
     pub error: VertexDifference,
-    pub field_bytes: u64,
 }
 
 #[derive(Clone, Debug, Serialize)]
@@ -184,7 +183,6 @@ fn row(
         merge_ms: spread(&merges[i]),
         entries: entries[i],
         error: reference.error(&found[i]),
-        field_bytes: frames[i].memory().fields,
     };
     let off = side(0);
     let on = side(1);

@@ -2,7 +2,7 @@
 
 use crate::stage;
 use shadow_fields::bake;
-use shadow_fields::bench::trials::{cases, run};
+use shadow_fields::bench::stability::{cases, trial};
 use shadow_fields::check;
 use shadow_fields::field::Storage;
 use shadow_fields::frame;
@@ -16,7 +16,7 @@ fn odd_scenes_stay_bounded() {
         for (storage, base) in [(Storage::F16, check::sharp::sharp_options()), (Storage::F32, small())] {
             let bake = bake::Options { storage, ..base.bake };
             let options = frame::Options { bake, skip: Skip::without("unmoved"), ..base };
-            let trial = run(&case, stage.frame(&case.scene, options), storage).unwrap();
+            let trial = trial(&case, stage.frame(&case.scene, options), storage).unwrap();
             assert!(trial.passed, "{trial:?}");
         }
     }

@@ -106,10 +106,3 @@ fn a_device_never_seen_gets_a_default_at_once() {
         assert_ne!(known().1[key], value, "{key}: and measured again");
     }
 }
-
-#[test]
-fn an_unknown_variant_lists_the_known() {
-    let Some(folder) = Folder::with_device() else { return };
-    let ran = folder.run("profile --variant fast");
-    assert!(ran.code == 2 && ran.stderr.contains("texel-shifted"), "{} {}", ran.code, ran.stderr);
-}

@@ -1,7 +1,6 @@
 //! What goes wrong on machines: kills, damage, folders that cannot be written. Nothing is lost then, and nothing is
 //! wrong.
 
-use super::engines::{has_dask, search_path};
 use super::{Farm, MESHES, common, finish, processes, whole};
 use serde_json::{Value, json};
 use shadow_fields::farm::{Plan, results};
@@ -76,36 +75,6 @@ fn folders_that_cannot_be_written_lose_nothing() {
     }
     farm.good(&["farm", "submit", "p.json", "--engine", "local"]);
     assert!(farm.collected() == whole().files);
-}
-
-/// Slices end when what waits for them is killed, and leave no result.
-#[test]
-fn slices_end_with_a_killed_submitter() {
-    let Some(farm) = Farm::with_device() else { return };
-    farm.good(&["farm", "plan", "meshes/a.obj", "-o", "p.json", "--quality", "high"]);
-    let slice = [farm.path("p.json").as_os_str().as_encoded_bytes(), b"\0"].concat();
-    let wait = |seconds, what: &str, done: &dyn Fn() -> bool| {
-        let start = std::time::Instant::now();
-        while !done() {
-            assert!(start.elapsed().as_secs() < seconds, "{what}");
-            std::thread::sleep(std::time::Duration::from_millis(20));
-        }
-    };
-    for engine in ["local", "dask"] {
-        let is_there = engine == "local" || has_dask();
-        let mut submit = farm.command(&["farm", "submit", "p.json", "--engine", engine, "--workers", "1", "-q"]);
-        if !is_there {
-            continue;
-        }
-        let mut submit = submit.env("PATH", search_path()).spawn().unwrap();
-        wait(60, "a slice begins", &|| !processes(&slice).is_empty());
-        std::thread::sleep(std::time::Duration::from_millis(500));
-        submit.kill().unwrap();
-        submit.wait().unwrap();
-        let folder = farm.folder.path().as_os_str().as_encoded_bytes();
-        wait(10, "slices end", &|| processes(folder).is_empty());
-        assert_eq!(farm.results(), [] as [std::path::PathBuf; 0], "{engine}: it was ended, not waited for");
-    }
 }
 
 /// Process ids of all that descend from a process, and its own.

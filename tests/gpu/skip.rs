@@ -154,7 +154,7 @@ fn a_light_that_faces_away_is_left_off() {
     let options = frame::Options { bake, ..small() };
     let mut with = stage.frame(&scene, options);
     // With a threshold of 0 the twin looks at everything, left off or not.
-    let worst = against_twin(&mut with, &placements).unwrap().worst;
+    let worst = against_twin(&mut with, &placements).unwrap();
     assert!(worst < ARITHMETIC, "{worst}");
     let a = stage.light(&mut with, &placements);
     assert!(a[0].iter().flatten().all(|c| *c == 0.0), "no light goes down");

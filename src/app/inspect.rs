@@ -248,7 +248,7 @@ fn cubes(field: &ShadowField) -> Sheet {
     Sheet { tile: [4 * FACE_PX, 3 * FACE_PX], rows }
 }
 
-/// The cube that the field's coefficients describe at a place (in r): visibility, or radiance in linear RGB; black beside
+/// The cube that the field's coefficients describe at a place (in r): visibility, or radiance in linear RGB; NaN beside
 /// its faces.
 fn unfolded(field: &ShadowField, position: DVec3) -> Vec<[f32; 3]> {
     let bands = field.header.bands;
@@ -260,7 +260,7 @@ fn unfolded(field: &ShadowField, position: DVec3) -> Vec<[f32; 3]> {
     };
     let found: Vec<Vec<f64>> = (0..channels).map(channel).collect();
     let texel = |x: usize, y: usize| {
-        let Some(face) = UNFOLDED[y / FACE_PX][x / FACE_PX] else { return [0.0; 3] };
+        let Some(face) = UNFOLDED[y / FACE_PX][x / FACE_PX] else { return [f32::NAN; 3] };
         let [s, t] = [x, y].map(|at| cube::texel_st(at % FACE_PX, FACE_PX));
         let mut basis = [0.0; MAX_COEFFICIENTS];
         evaluate(bands, cube::direction(face, s, t), &mut basis);

@@ -12,7 +12,7 @@ const BETWEEN: f32 = 0.35;
 pub struct Sheet {
     /// Width and height of a tile in pixels.
     pub tile: [usize; 2],
-    /// A line of text, none if empty, and the tiles below it: linear RGB, row by row.
+    /// A line of text, none if empty, and the tiles below it: linear RGB, row by row; NaN is left open.
     pub rows: Vec<(String, Vec<Vec<[f32; 3]>>)>,
 }
 
@@ -33,8 +33,8 @@ impl Sheet {
             for (column, tile) in tiles.iter().enumerate() {
                 let left = GAP + column * (tile_width + GAP);
                 for (y, line) in tile.chunks_exact(tile_width).enumerate() {
-                    let at = 3 * ((top + y) * width + left);
-                    rgb[at..at + 3 * tile_width].copy_from_slice(line.as_flattened());
+                    let places = rgb[3 * ((top + y) * width + left)..].iter_mut();
+                    places.zip(line.as_flattened()).filter(|(_, value)| !value.is_nan()).for_each(|(p, v)| *p = *v);
                 }
             }
             top += tile_height + GAP;

@@ -3,10 +3,11 @@
 use super::context::Context;
 use super::outputs::{Output, Outputs};
 use super::source::GltfArguments;
-use super::{Global, output, silhouette};
+use super::{Global, output};
 use crate::asset::Mesh;
 use crate::asset::environment::RADIANCE_LIMIT;
-use crate::bake::{self, BakeOptions, silhouette::SilhouetteOptions};
+use crate::bake::silhouette::{SilhouetteOptions, bake_silhouette};
+use crate::bake::{self, BakeOptions};
 use crate::error::{Error, Result};
 use crate::field::FieldKind;
 use crate::scene;
@@ -14,10 +15,9 @@ use crate::text::{number, triple};
 use clap::Args;
 use clap::builder::BoolishValueParser;
 use glam::Vec3;
-use serde_json::json;
+use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 
-/// Arguments of `bake`.
 #[derive(Args)]
 #[command(after_help = "Examples:\n  shadow-fields bake assets/meshes/teapot.obj -o teapot.sf\n  \
     shadow-fields bake lamp.obj -o lamp.sf --radiance 4,3,2 --quality high")]
@@ -54,7 +54,6 @@ impl Arguments {
     }
 }
 
-/// Parses a radiance.
 fn color(text: &str) -> std::result::Result<Vec3, String> {
     triple(number(0.0..=RADIANCE_LIMIT))(text).map(Vec3::from_array)
 }
@@ -76,38 +75,55 @@ pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
     Outputs::check(&inputs, &[Output::new("--output", &arguments.output, "sf")])?;
     let mut mesh = arguments.gltf.mesh(global, &arguments.mesh)?;
     let options = arguments.options()?;
-    if arguments.silhouette {
-        return silhouette::bake(global, (&mesh, &arguments.mesh), &arguments.output, options.silhouette);
-    }
-    let kind = if arguments.radiance.is_some() { FieldKind::Radiance } else { FieldKind::Occlusion };
     if let Some(radiance) = arguments.radiance {
         mesh = shining(mesh, radiance, &arguments.mesh)?;
     }
     let context = Context::new(global)?;
-    let (field, report) = context
-        .baker
-        .field(&mesh, bake::header(&mesh, kind, &options), &|done, all| context.progress.show(&mesh.name, done, all))
-        .map_err(|error| error.context(arguments.mesh.display()))?;
-    let result = json!({
-        "origin": context.origin(global), "file": arguments.output.display().to_string(),
-        "triangles": mesh.triangles.len(), "report": report, "header": field.header,
-    });
-    // A field that the validation layer objected to is not written.
-    context.finish()?;
-    field.write(&arguments.output).map_err(output::unwritten)?;
-    if global.json {
-        output::say(result.to_string());
-    } else {
-        output::say(format!(
-            "{}: {} samples ({} filled, {} captured), {} triangles, {} bytes, {:.2} s",
-            output::shown(&arguments.output),
-            report.samples + report.filled,
-            report.filled,
-            field.header.captured_samples,
-            mesh.triangles.len(),
-            field.payload.len(),
+    let progress = |done, all| context.progress.show(&mesh.name, done, all);
+    let of_mesh = |error: Error| error.context(arguments.mesh.display());
+    let triangles = mesh.triangles.len();
+    let out = &arguments.output;
+    if arguments.silhouette {
+        let (field, report) = bake_silhouette(&context.baker, &mesh, options.silhouette, &progress).map_err(of_mesh)?;
+        let header = &field.header;
+        let line = format!(
+            "{} maps of {1}x{1}, {triangles} triangles, {2} bytes, {3:.2} s",
+            header.map_count(),
+            header.map_px,
+            field.payload().len(),
             report.total.as_secs_f64()
-        ));
+        );
+        let json = json!({ "triangles": triangles, "report": report, "header": header });
+        return finish(global, context, out, || field.write(out), json, &line);
     }
+    let kind = if arguments.radiance.is_some() { FieldKind::Radiance } else { FieldKind::Occlusion };
+    let wanted = bake::header(&mesh, kind, &options);
+    let (field, report) = context.baker.field(&mesh, wanted, &progress).map_err(of_mesh)?;
+    let line = format!(
+        "{} samples ({} filled, {} captured), {triangles} triangles, {} bytes, {:.2} s",
+        report.samples + report.filled,
+        report.filled,
+        field.header.captured_samples,
+        field.payload.len(),
+        report.total.as_secs_f64()
+    );
+    let json = json!({ "triangles": triangles, "report": report, "header": field.header });
+    finish(global, context, out, || field.write(out), json, &line)
+}
+
+/// Writes a field to `out` unless the validation layer objected to it, and says what was done.
+fn finish(
+    global: &Global,
+    context: Context,
+    out: &Path,
+    write: impl FnOnce() -> Result<()>,
+    mut json: Value,
+    line: &str,
+) -> Result<()> {
+    json["origin"] = context.origin(global);
+    json["file"] = out.display().to_string().into();
+    context.finish()?;
+    write().map_err(output::unwritten)?;
+    output::say(if global.json { json.to_string() } else { format!("{}: {line}", output::shown(out)) });
     Ok(())
 }

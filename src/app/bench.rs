@@ -4,13 +4,12 @@ use super::context::Context;
 use super::source::GltfSceneArguments;
 use super::{Global, output, outputs};
 use crate::bench::cases::{self, Case};
-use crate::bench::stability::{self, NEAR_F16, NEAR_F32, StabilityOutcome};
-use crate::bench::time_error::{self, Selection, TimeErrorOutcome};
-use crate::bench::trials::NEAR_TWIN;
+use crate::bench::stability::{self, NEAR_TWIN, Trial};
+use crate::bench::time_error::{self, TimeErrorOutcome};
 use crate::bench::{Bench, scaling, skips};
 use crate::error::{Error, Result};
 use crate::scene;
-use crate::text::three;
+use crate::text::{self, three};
 use crate::truth::exposure;
 use clap::{Args, Subcommand};
 use serde::Serialize;
@@ -18,7 +17,6 @@ use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-/// Arguments of `bench`.
 #[derive(Args)]
 pub struct Arguments {
     #[command(subcommand)]
@@ -27,29 +25,25 @@ pub struct Arguments {
 
 #[derive(Subcommand)]
 enum What {
-    /// Split the error of pictures into its causes, sweep the settings, and compare with ray casting and shadow maps
+    /// Split the error of pictures into its causes, and compare with ray casting and shadow maps
     #[command(
         after_help = "Examples:\n  shadow-fields bench time-error --quick --output out/errors\n  shadow-fields bench time-error my_scene.toml \
-        --axis lattice --output out/my_scene\n  shadow-fields bench time-error --case torus --axis lattice --output out/torus"
+        --output out/my_scene\n  shadow-fields bench time-error --case torus --output out/torus"
     )]
     TimeError {
-        /// Scene file or glTF file to measure and sweep instead of the built-in cases, at the time_s of its [output]
+        /// Scene file or glTF file to measure instead of the built-in cases, at the time_s of its [output]
         #[arg(value_name = "SCENE", conflicts_with = "case")]
         scene: Option<PathBuf>,
-        /// Measure and sweep only cases that have TEXT in their names; may be given again; a text that none has lists
+        /// Measure only cases that have TEXT in their names; may be given again; a text that none has lists
         /// them
         #[arg(long, value_name = "TEXT")]
         case: Vec<String>,
-        /// Sweep only this axis, with all its settings (each may need bakes of its own); may be given again; an unknown
-        /// name lists them
-        #[arg(long, value_name = "NAME")]
-        axis: Vec<String>,
         #[command(flatten)]
         gltf: GltfSceneArguments,
         #[command(flatten)]
         run: RunArguments,
     },
-    /// Test the merge with long chains, extreme places and extreme numbers; exit code 1 where a trial fails
+    /// Test the merge with many occluders, extreme places and extreme numbers; exit code 1 where a trial fails
     Stability(RunArguments),
     /// Measure what each skip saves and how it changes the error
     Skip {
@@ -71,48 +65,47 @@ enum What {
 
 #[derive(Args)]
 struct RunArguments {
-    /// A minute on two cores instead of five, or a quarter of an hour for time-error: fewer and smaller scenes, settings
-    /// and rays
+    /// A minute on two cores instead of five, or a quarter of an hour for time-error: fewer and smaller scenes and rays
     #[arg(long)]
     quick: bool,
-    /// Folder for the results as CSV and JSON, and for pictures
+    /// Folder for the results as JSON
     #[arg(short, long = "output", alias = "out", value_name = "DIR")]
     out: PathBuf,
 }
 
-/// Runs a measurement.
 pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
     match &arguments.what {
-        What::TimeError { scene, case, axis, gltf, run } => {
+        What::TimeError { scene, case, gltf, run } => {
             let own = scene.as_deref().map(|path| own_case(global, gltf, path)).transpose()?;
             let inputs: Vec<PathBuf> = scene.iter().flat_map(|path| scene::files::of_scene(path)).collect();
-            let selection = Selection { scene: scene.clone(), cases: case.clone(), axes: axis.clone() };
-            let measured = |bench: &Bench<'_>| time_error::run(bench, &run.out, &selection, own);
-            measure(global, run, &inputs, measured, print_time_error)?;
+            let cases = own.map_or_else(|| time_error::chosen(run.quick, case), |case| Ok(vec![case]))?;
+            let measured = |bench: &Bench<'_>| time_error::run(bench, &cases);
+            measure(global, run, "time-error", &inputs, measured, print_time_error)?;
         }
         What::Stability(run) => {
-            let outcome = measure(global, run, &[], |bench| stability::run(bench, &run.out), print_stability)?;
-            let [failed, all] = outcome.failed();
+            let trials = measure(global, run, "stability", &[], stability::run, |trials| print_stability(trials))?;
+            let failed = trials.iter().filter(|trial| !trial.passed).count();
             if failed > 0 {
-                return Err(Error::Failed(format!("{failed} of {all} trials failed")));
+                return Err(Error::Failed(format!("{failed} of {} trials failed", trials.len())));
             }
         }
         What::Skip { case, run } => {
             let scenes = cases::named(skips::all(run.quick)?, case)?;
-            measure(global, run, &[], |bench| skips::run(bench, &run.out, &scenes), |rows| print_skips(rows))?;
+            measure(global, run, "skip", &[], |bench| skips::run(bench, &scenes), |rows| print_skips(rows))?;
         }
         What::Scaling { axis, run } => {
-            measure(global, run, &[], |bench| scaling::run(bench, &run.out, axis), |points| print_scaling(points))?;
+            measure(global, run, "scaling", &[], |bench| scaling::run(bench, axis), |points| print_scaling(points))?;
         }
     }
     Ok(())
 }
 
-/// Opens the device, measures with progress on stderr, and prints the outcome: as JSON, or the tables that `print` makes
-/// of it. The folder of results must not hold any of the inputs.
+/// Opens the device, measures with progress on stderr, writes the outcome as NAME.json, and prints it: as JSON, or the
+/// tables that `print` makes of it. The folder of results must not hold any of the inputs.
 fn measure<T: Serialize>(
     global: &Global,
     run: &RunArguments,
+    name: &str,
     inputs: &[PathBuf],
     measured: impl FnOnce(&Bench<'_>) -> Result<T>,
     print: impl FnOnce(&T),
@@ -126,8 +119,11 @@ fn measure<T: Serialize>(
         }
     };
     let outcome = measured(&bench(&context, global, run.quick, &show))?;
+    let document = json!({ "origin": context.origin(global), "quick": run.quick, "outcome": outcome });
+    text::make_folder(&run.out)?;
+    text::write(&run.out.join(format!("{name}.json")), format!("{document:#}\n"))?;
     if global.json {
-        output::say(json!(outcome).to_string());
+        output::say(document["outcome"].to_string());
     } else {
         print(&outcome);
     }
@@ -137,8 +133,7 @@ fn measure<T: Serialize>(
 
 /// The measurements' view of an open device.
 pub fn bench<'b>(context: &'b Context, global: &Global, quick: bool, progress: &'b dyn Fn(&str)) -> Bench<'b> {
-    let origin = context.origin(global);
-    Bench { baker: &context.baker, cache: &context.cache, progress, quick, seed: global.seed, origin }
+    Bench { baker: &context.baker, cache: &context.cache, progress, quick, seed: global.seed }
 }
 
 /// The case of a scene file.
@@ -179,9 +174,6 @@ fn print_time_error(outcome: &TimeErrorOutcome) {
         ("T0 error", "/t0_error_relative"),
     ];
     table(&outcome.budgets, &columns);
-    output::say("\nPictures against rays from pixels: mean FLIP and relative RMS error");
-    let columns = [("scene", "/case"), ("FLIP", "/pixels/mean_flip_ratio"), ("RMS", "/pixels/rms_relative")];
-    table(&outcome.pictures, &columns);
     output::say(
         "\nA frame, everything merged, against ray casting with as many threads at equal error, and the quickest shadow map that errs no \
          more\n(at vertices without drawing, at pixels with it)",
@@ -197,40 +189,11 @@ fn print_time_error(outcome: &TimeErrorOutcome) {
         ("map ms", "/map_ms_at_equal_rms"),
     ];
     table(&outcome.comparisons, &columns);
-    if !outcome.points.is_empty() {
-        output::say("\nSettings, one at a time round the default");
-        let columns = [
-            ("scene", "/case"),
-            ("axis", "/axis"),
-            ("setting", "/name"),
-            ("merge ms", "/merge_ms/median"),
-            ("over default", "/time_per_default_ratio"),
-            ("error", "/total/rms_relative"),
-            ("field bytes", "/field_bytes"),
-        ];
-        table(&outcome.points, &columns);
-    }
 }
 
-fn print_stability(outcome: &StabilityOutcome) {
+fn print_stability(trials: &[Trial]) {
     output::say(format!(
-        "Irradiance behind chains of caps (1 where nothing blocks). A guarded chain stays from 0 to 1, in f32 within \
-         {NEAR_F32:e} of f64,\nwith factors in f16 within {NEAR_F16:e}; 7 bands of visibility are not guarded"
-    ));
-    let columns = [
-        ("caps", "/caps"),
-        ("count", "/cap_count"),
-        ("truth", "/truth_relative"),
-        ("plain", "/plain_relative"),
-        ("guarded", "/guarded_relative"),
-        ("f32", "/guarded_f32_relative"),
-        ("f16", "/guarded_f16_relative"),
-        ("7 bands", "/plain_7_bands_relative"),
-        ("passed", "/passed"),
-    ];
-    table(&outcome.chains, &columns);
-    output::say(format!(
-        "\nOdd scenes: everything finite, the same bytes when merged again, radiosity within its bound, and within {NEAR_TWIN:e} \
+        "Odd scenes: everything finite, the same bytes when merged again, radiosity within its bound, and within {NEAR_TWIN:e} \
          of the f64 twin"
     ));
     let columns = [
@@ -243,13 +206,13 @@ fn print_stability(outcome: &StabilityOutcome) {
         ("against f64", "/twin_error_relative"),
         ("passed", "/passed"),
     ];
-    table(&outcome.trials, &columns);
+    table(&trials, &columns);
 }
 
 fn print_skips(rows: &[skips::SkipCost]) {
     output::say(
-        "Times of a frame without drawing, in turns without and with the skip (for \"hidden\" with drawing, at 1280x720). Left off: \
-         entries of\nlists (for \"hidden\": clusters). Errors and changes are relative to the RMS radiosity.",
+        "Times of a frame without drawing, in turns without and with the skip (for \"hidden\" with drawing, at 1280x720).\nErrors \
+         and changes are relative to the RMS radiosity.",
     );
     let columns = [
         ("scene", "/case"),
@@ -257,7 +220,6 @@ fn print_skips(rows: &[skips::SkipCost]) {
         ("off ms", "/off/frame_ms/median"),
         ("on ms", "/on/frame_ms/median"),
         ("times faster", "/speed_up_ratio"),
-        ("left off", "/left_off_count"),
         ("off lookups", "/off/entry_count"),
         ("on lookups", "/on/entry_count"),
         ("off error", "/off/error/rms_relative"),
@@ -282,7 +244,6 @@ fn print_scaling(points: &[scaling::ScalingPoint]) {
         ("lookups/vertex", "/entries_a_vertex"),
         ("error", "/error"),
         ("device bytes", "/device_bytes"),
-        ("resident bytes", "/resident_bytes"),
     ];
     table(&points, &columns);
 }

@@ -12,7 +12,6 @@ use clap::Args;
 use serde_json::json;
 use std::path::PathBuf;
 
-/// Arguments of `compare`.
 #[derive(Args)]
 #[command(
     after_help = "FLIP (Andersson et al. 2020) is how different two pictures look when one flips between them, 0 to 1 a pixel: \
@@ -47,7 +46,6 @@ pub struct Arguments {
     exposure_ev: f32,
 }
 
-/// Compares, prints, and fails beyond a bound.
 pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
     if let Some(path) = &arguments.output {
         let inputs = [&arguments.first, &arguments.second].into_iter().chain(&arguments.mask).cloned();

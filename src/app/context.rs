@@ -74,11 +74,8 @@ pub fn cache_dir(global: &Global) -> Option<PathBuf> {
 
 /// An open device with what goes with it.
 pub struct Context {
-    /// The device.
     pub device: Arc<Device>,
-    /// Bakes on it.
     pub baker: Baker,
-    /// Baked things on disk.
     pub cache: Cache,
     /// Where bakes show how far they are.
     pub progress: Progress,

@@ -1,5 +1,6 @@
 //! `shadow-fields demo` bakes and renders the built-in scenes and times them.
 
+use super::bench::table;
 use super::context::Context;
 use super::{Global, output, outputs};
 use crate::asset::picture;
@@ -16,7 +17,6 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-/// Arguments of `demo`.
 #[derive(Args)]
 pub struct Arguments {
     /// Folder for the pictures
@@ -47,7 +47,6 @@ const ANIMATION: (u32, u16) = (36, 12);
 /// Size of an animation's pictures.
 const ANIMATION_SIZE: [u32; 2] = [480, 320];
 
-/// Bakes and renders the built-in scenes.
 pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
     let started = Instant::now();
     outputs::check_folder("--output", &arguments.output, &[])?;
@@ -74,19 +73,19 @@ pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
         output::say(json!({ "origin": origin, "scenes": rows, "pictures": files }).to_string());
         return Ok(());
     }
-    let header = [
-        "scene",
-        "vertices",
-        "entities",
-        "bake, s",
-        "merge, ms",
-        "draw, ms",
-        "frame, ms",
-        "frames/s",
-        "at 4 samples",
-        "at 1 sample",
+    let columns = [
+        ("scene", "/scene"),
+        ("vertices", "/vertices"),
+        ("entities", "/entities"),
+        ("bake, s", "/bake_s"),
+        ("merge, ms", "/merge_ms"),
+        ("draw, ms", "/draw_ms"),
+        ("frame, ms", "/frame_ms"),
+        ("frames/s", "/frames_per_s"),
+        ("at 4 samples", "/frames_per_s_at_4_samples"),
+        ("at 1 sample", "/frames_per_s_at_1_sample"),
     ];
-    output::table(&header, &rows.iter().map(DemoRow::cells).collect::<Vec<_>>());
+    table(&rows, &columns);
     output::say(
         "Draw, frame and frames/s: one sample a pixel, outlines smoothed. The last two columns are frames/s as well.",
     );
@@ -104,34 +103,16 @@ struct DemoRow {
     scene: &'static str,
     vertices: usize,
     entities: usize,
-    bake_s: f64,
+    /// `None` where all was in the cache.
+    bake_s: Option<f64>,
     merge_ms: f64,
     draw_ms: f64,
     frame_ms: f64,
-    draw_4_samples_ms: f64,
-    frame_4_samples_ms: f64,
-    draw_1_sample_ms: f64,
-    frame_1_sample_ms: f64,
+    frames_per_s: f64,
+    frames_per_s_at_4_samples: f64,
+    frames_per_s_at_1_sample: f64,
     first_picture_s: f64,
     variant: &'static str,
-}
-
-impl DemoRow {
-    fn cells(&self) -> Vec<String> {
-        let bake = if self.bake_s > 0.0 { format!("{:.2}", self.bake_s) } else { "cached".into() };
-        vec![
-            self.scene.to_owned(),
-            self.vertices.to_string(),
-            self.entities.to_string(),
-            bake,
-            format!("{:.2}", self.merge_ms),
-            format!("{:.2}", self.draw_ms),
-            format!("{:.2}", self.frame_ms),
-            format!("{:.1}", 1e3 / self.frame_ms),
-            format!("{:.1}", 1e3 / self.frame_4_samples_ms),
-            format!("{:.1}", 1e3 / self.frame_1_sample_ms),
-        ]
-    }
 }
 
 /// The scene's picture, and its frame time while it moves: frames as a window shows them, not read back, edges smoothed
@@ -159,19 +140,18 @@ fn still(
         let all: f64 = passes.iter().filter_map(|pass| times.get(*pass)).map(|times| spread(times).median).sum();
         all + 0.0 // the sum of none is -0
     };
-    let draw = ["draw", "smooth"];
+    let baked = &frame.buffers.baked;
     Ok(DemoRow {
         scene: name,
         vertices: frame.receiver_vertex_count(),
         entities: scene.entities.len(),
-        bake_s: frame.buffers.baked.iter().map(|b| b.report.total.as_secs_f64()).sum(),
+        bake_s: (!baked.is_empty()).then(|| baked.iter().map(|b| b.report.total.as_secs_f64()).sum()),
         merge_ms: median(&outlines, &["merge", "sharp"]),
-        draw_ms: median(&outlines, &draw),
+        draw_ms: median(&outlines, &["draw", "smooth"]),
         frame_ms: median(&outlines, &["frame"]),
-        draw_4_samples_ms: median(&samples, &draw),
-        frame_4_samples_ms: median(&samples, &["frame"]),
-        draw_1_sample_ms: median(&single, &draw),
-        frame_1_sample_ms: median(&single, &["frame"]),
+        frames_per_s: 1e3 / median(&outlines, &["frame"]),
+        frames_per_s_at_4_samples: 1e3 / median(&samples, &["frame"]),
+        frames_per_s_at_1_sample: 1e3 / median(&single, &["frame"]),
         first_picture_s,
         variant: frame.variant().name,
     })

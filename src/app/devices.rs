@@ -5,7 +5,6 @@ use crate::error::Result;
 use crate::gpu::Device;
 use clap::Args;
 
-/// Arguments of `devices`.
 #[derive(Args)]
 pub struct Arguments {}
 

@@ -12,7 +12,6 @@ use serde_json::json;
 use std::io::Read;
 use std::path::{Path, PathBuf};
 
-/// Arguments of `import`.
 #[derive(Args)]
 #[command(
     after_help = "The scene file can be edited like any other; it names the glTF file for meshes and textures, which has to stay. \

@@ -1,21 +1,21 @@
 //! `shadow-fields inspect` shows what is in a field file.
 
 use super::outputs::{Output, Outputs};
-use super::sheet::{self, Cell, Row};
-use super::{Global, output, silhouette};
+use super::sheet::Sheet;
+use super::{Global, output};
+use crate::asset::picture;
 use crate::error::{Error, Result, one_line};
 use crate::field::file;
-use crate::field::silhouette::SILHOUETTE_MAGIC;
+use crate::field::silhouette::{REACH, SILHOUETTE_MAGIC, Side, SilhouetteField};
 use crate::field::{FieldKind, ShadowField};
 use crate::sh::basis::{MAX_COEFFICIENTS, coefficient_count, evaluate};
 use crate::sh::cube;
 use crate::text::{self, number, triple};
 use clap::Args;
 use glam::DVec3;
-use serde_json::json;
-use std::path::{Path, PathBuf};
+use serde_json::{Value, json};
+use std::path::PathBuf;
 
-/// Arguments of `inspect`.
 #[derive(Args)]
 #[command(
     after_help = "Examples:\n  shadow-fields inspect teapot.sf\n  shadow-fields inspect teapot.sf --at 0,1.5,2\n  \
@@ -30,7 +30,8 @@ pub struct Arguments {
     /// With --at: follow the ray from there in this direction, in the mesh's frame. A silhouette field needs it
     #[arg(long, value_name = "X,Y,Z", value_parser = direction, allow_hyphen_values = true, requires = "at")]
     toward: Option<DVec3>,
-    /// Write a picture of the cube faces that the coefficients describe, over latitude, longitude and distance
+    /// Write a picture of the cubes that the coefficients describe (-X +Z +X -Z, +Y above, -Y below), over latitude,
+    /// longitude and distance; of a silhouette field, its maps
     #[arg(long, value_name = "OUT.png")]
     faces: Option<PathBuf>,
 }
@@ -47,51 +48,63 @@ fn direction(text: &str) -> std::result::Result<DVec3, String> {
     if toward.length() > 1e-6 { Ok(toward) } else { Err(format!("expected a direction like 0,1,0.5, got \"{text}\"")) }
 }
 
-/// Prints or draws a silhouette field. A ray needs a place and a direction.
-fn silhouette(global: &Global, arguments: &Arguments) -> Result<()> {
-    let ray = match (arguments.at, arguments.toward) {
-        (Some(_), None) => return Err(Error::Usage("--at needs --toward X,Y,Z for a silhouette field".into())),
-        (at, toward) => at.zip(toward),
-    };
-    silhouette::inspect(global, &arguments.field, ray, arguments.faces.as_deref())
+/// What is told of a field.
+struct About {
+    /// Its header and more, with "at" where a lookup is asked for.
+    json: Value,
+    lines: Vec<(&'static str, String)>,
+    /// The picture, where one is asked for.
+    sheet: Option<Sheet>,
 }
 
-/// Shows a field.
 pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
     if let Some(path) = &arguments.faces {
         Outputs::check(std::slice::from_ref(&arguments.field), &[Output::new("--faces", path, "png")])?;
     }
-    if file::has_magic(&arguments.field, SILHOUETTE_MAGIC) {
-        return silhouette(global, arguments);
+    let is_silhouette = file::has_magic(&arguments.field, SILHOUETTE_MAGIC);
+    let about = if is_silhouette { about_silhouettes(arguments)? } else { about_field(arguments)? };
+    if let (Some(path), Some(sheet)) = (&arguments.faces, &about.sheet) {
+        sheet.write(path)?;
     }
+    if global.json {
+        output::say(about.json.to_string());
+        return Ok(());
+    }
+    for (name, value) in about.lines {
+        output::say(format!("{name:16} {value}"));
+    }
+    if let Some(at) = about.json.get("at") {
+        output::say(format!("{:16} {at}", "at"));
+    }
+    Ok(())
+}
+
+fn mesh_line(mesh: &str, hash: &str) -> String {
+    format!("{} ({})", one_line(mesh), &hash[..16.min(hash.len())])
+}
+
+fn about_field(arguments: &Arguments) -> Result<About> {
     if arguments.toward.is_some() {
         return Err(Error::Usage("--toward goes with a silhouette field".into()));
     }
     let field = ShadowField::read(&arguments.field)?;
     let header = &field.header;
-    let mut result = json!({
+    let lattice = header.lattice;
+    let mut json = json!({
         "file": arguments.field.display().to_string(),
         "header": header,
-        "samples": header.lattice.sample_count(),
-        "stored_samples": header.lattice.stored_count(),
+        "samples": lattice.sample_count(),
+        "stored_samples": lattice.stored_count(),
         "payload_bytes": field.payload.len(),
     });
     if let Some(position_m) = arguments.at {
-        result["at"] = lookup(&field, position_m);
+        json["at"] = lookup(&field, position_m);
     }
-    if let Some(path) = &arguments.faces {
-        write_sheet(global, &field, path)?;
-    }
-    if global.json {
-        output::say(result.to_string());
-        return Ok(());
-    }
-    let lattice = header.lattice;
     let shells: Vec<String> = (0..lattice.shells).map(|k| format!("{:.3}", lattice.shell(k))).collect();
     let storage = format!("{:?}", header.storage).to_lowercase();
-    let lines = [
+    let mut lines = vec![
         ("kind", format!("{:?}", header.kind).to_lowercase()),
-        ("mesh", format!("{} ({})", one_line(&header.mesh), &header.mesh_hash[..16.min(header.mesh_hash.len())])),
+        ("mesh", mesh_line(&header.mesh, &header.mesh_hash)),
         ("bounding sphere", format!("centre {:?} m, radius {} m", header.centre_m, header.radius_m)),
         ("bands", format!("{} ({} coefficients a channel)", header.bands, header.bands * header.bands)),
         ("lattice", lattice.to_string()),
@@ -102,20 +115,80 @@ pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
         ("stored", format!("{} samples, {storage}, {} bytes", lattice.stored_count(), field.payload.len())),
         ("face", format!("{0} x {0} texels", header.face_px)),
     ];
-    for (name, value) in lines {
-        output::say(format!("{name:16} {value}"));
-    }
     if header.kind == FieldKind::Radiance {
-        output::say(format!("{:16} {}", "radiance scale", header.radiance_scale));
+        lines.push(("radiance scale", header.radiance_scale.to_string()));
     }
-    if result["at"] != serde_json::Value::Null {
-        output::say(format!("{:16} {}", "at", result["at"]));
+    Ok(About { json, lines, sheet: arguments.faces.is_some().then(|| cubes(&field)) })
+}
+
+fn about_silhouettes(arguments: &Arguments) -> Result<About> {
+    if arguments.at.is_some() && arguments.toward.is_none() {
+        return Err(Error::Usage("--at needs --toward X,Y,Z for a silhouette field".into()));
     }
-    Ok(())
+    let field = SilhouetteField::read(&arguments.field)?;
+    let header = &field.header;
+    let mut json = json!({
+        "file": arguments.field.display().to_string(), "header": header, "maps": header.map_count(),
+        "payload_bytes": field.payload().len(),
+    });
+    if let (Some(position_m), Some(toward)) = (arguments.at, arguments.toward) {
+        json["at"] = follow(&field, position_m, toward.normalize());
+    }
+    let halves = header.half_px;
+    let lines = vec![
+        ("kind", "silhouette".to_owned()),
+        ("mesh", mesh_line(&header.mesh, &header.mesh_hash)),
+        ("bounding sphere", format!("centre {:?} m, radius {} m", header.centre_m, header.radius_m)),
+        ("directions", format!("{0} x {0} cells a cube face, {1} maps", header.cells, header.map_count())),
+        ("map", format!("{0} x {0} texels from views of {1} x {1} pixels", header.map_px, header.view_px)),
+        ("halves", if halves == 0 { "none".to_owned() } else { format!("{halves} x {halves} texels each") }),
+        ("stored", format!("{} bytes", field.payload().len())),
+    ];
+    Ok(About { json, lines, sheet: arguments.faces.is_some().then(|| maps(&field)) })
+}
+
+/// The outline near a ray, in metres, and what it leaves of small lights at infinity.
+fn follow(field: &SilhouetteField, position_m: DVec3, direction: DVec3) -> Value {
+    let radius_m = f64::from(field.header.radius_m);
+    let centre = DVec3::from_array(field.header.centre_m.map(f64::from));
+    let point = (position_m - centre) / radius_m;
+    let near = field.near(point, direction);
+    let outline = field.outline(&near, Side::Whole, direction);
+    let blocked = |angle_deg: f64| field.blocked(&near, direction, f64::INFINITY, angle_deg.to_radians().tan());
+    json!({
+        "position_m": position_m.to_array(), "direction": direction.to_array(),
+        "outline_distance_m": outline.distance * radius_m,
+        "outline_along_ray_m": (outline.depth - point.dot(direction)) * radius_m,
+        "blocked_of_light_of_1_3_8_deg": [blocked(1.0), blocked(3.0), blocked(8.0)],
+    })
+}
+
+/// All maps side by side: distances above, depths below.
+fn maps(field: &SilhouetteField) -> Sheet {
+    let edge = field.header.map_px as usize;
+    let count = field.header.map_count();
+    let columns = ((2 * count) as f64).sqrt().ceil() as usize;
+    let titles = [
+        format!("distance to the outline, black -{REACH} r outside to white {REACH} r inside"),
+        "depth of its nearest point, black -1 r to white 1 r along the light".to_owned(),
+    ];
+    let mut rows = Vec::new();
+    for (half, title) in titles.into_iter().enumerate() {
+        let level = |map: usize, texel: usize| {
+            let value = field.texel(map, Side::Whole, texel % edge, texel / edge)[half] / [REACH, 1.0][half];
+            [picture::linear_from_srgb(0.5 + 0.5 * value as f32); 3]
+        };
+        let tiles: Vec<Vec<_>> =
+            (0..count).map(|map| (0..edge * edge).map(|texel| level(map, texel)).collect()).collect();
+        rows.extend(tiles.chunks(columns).map(|tiles| (String::new(), tiles.to_vec())));
+        let first = rows.len() - count.div_ceil(columns);
+        rows[first].0 = title;
+    }
+    Sheet { tile: [edge; 2], rows }
 }
 
 /// The coefficients at a place in the mesh's frame, in metres.
-fn lookup(field: &ShadowField, position_m: DVec3) -> serde_json::Value {
+fn lookup(field: &ShadowField, position_m: DVec3) -> Value {
     let centre = DVec3::from_array(field.header.centre_m.map(f64::from));
     let position = (position_m - centre) / f64::from(field.header.radius_m);
     let channel = |channel| {
@@ -134,6 +207,9 @@ fn lookup(field: &ShadowField, position_m: DVec3) -> serde_json::Value {
 
 /// Edge of a face on the sheet in pixels.
 const FACE_PX: usize = 20;
+/// An unfolded cube: its faces, +X -X +Y -Y +Z -Z, in three rows.
+const UNFOLDED: [[Option<usize>; 4]; 3] =
+    [[None, Some(2), None, None], [Some(1), Some(4), Some(0), Some(5)], [None, Some(3), None, None]];
 /// Directions of the sheet's columns.
 const LONGITUDES: usize = 8;
 /// Polar angle of the sheet's blocks of rows, degrees from the equator.
@@ -141,70 +217,58 @@ const LATITUDES_DEG: [f64; 3] = [45.0, 0.0, -45.0];
 /// Shells of the sheet, as fractions of their number.
 const SHELLS: [f64; 4] = [0.0, 0.3, 0.6, 1.0];
 
-fn write_sheet(global: &Global, field: &ShadowField, path: &Path) -> Result<()> {
+/// Unfolded cubes around a field. Visibility is white at 1; radiance falls with the square of the distance, so each row
+/// has a white of its own.
+fn cubes(field: &ShadowField) -> Sheet {
     let lattice = field.header.lattice;
     let mut rows = Vec::new();
     for latitude_deg in LATITUDES_DEG {
         for fraction in SHELLS {
-            let shell = (fraction * f64::from(lattice.shells - 1)).round() as u32;
-            let distance = lattice.shell(shell);
-            let latitude = latitude_deg.to_radians();
-            let mut cells = Vec::new();
-            for column in 0..LONGITUDES {
+            let distance = lattice.shell((fraction * f64::from(lattice.shells - 1)).round() as u32);
+            let cube = |column: usize| {
                 let longitude = std::f64::consts::TAU * column as f64 / LONGITUDES as f64;
-                let direction =
-                    DVec3::new(latitude.cos() * longitude.cos(), latitude.sin(), latitude.cos() * longitude.sin());
-                cells.push(reconstruct(field, lattice.fit().invert(direction * distance)));
-            }
-            rows.push(Row { label: format!("{latitude_deg:+.0} deg, {distance:.2} r"), cells, white: 1.0 });
+                let (up, across) = latitude_deg.to_radians().sin_cos();
+                let direction = DVec3::new(across * longitude.cos(), up, across * longitude.sin());
+                unfolded(field, lattice.fit().invert(direction * distance))
+            };
+            let mut tiles: Vec<Vec<[f32; 3]>> = (0..LONGITUDES).map(cube).collect();
+            let white = match field.header.kind {
+                FieldKind::Occlusion => 1.0,
+                FieldKind::Radiance => {
+                    let values = tiles.iter().flat_map(|tile| tile.as_flattened());
+                    values.fold(f32::MIN_POSITIVE, |most, value| most.max(*value))
+                }
+            };
+            tiles.iter_mut().flat_map(|tile| tile.as_flattened_mut()).for_each(|value| *value /= white);
+            let white = text::three(f64::from(white));
+            let label = format!("{latitude_deg:+.0} deg up, 0 to 315 deg around, {distance:.2} r, white is {white}");
+            rows.push((label, tiles));
         }
     }
-    // Visibility has one white for the whole sheet. Radiance falls with the square of the distance, so each row has a
-    // white of its own.
-    let brightest = |rows: &[Row], least: f32| {
-        rows.iter().flat_map(|row| row.cells.iter().flatten()).fold(least, |most, value| most.max(*value))
-    };
-    let white = brightest(&rows, 1.0);
-    for row in &mut rows {
-        row.white = match field.header.kind {
-            FieldKind::Occlusion => white,
-            FieldKind::Radiance => brightest(std::slice::from_ref(row), f32::MIN_POSITIVE),
-        };
-        row.label += &format!(", white {}", text::three(f64::from(row.white)));
-    }
-    let columns: Vec<String> = (0..LONGITUDES).map(|c| format!("{} deg", 360 * c / LONGITUDES)).collect();
-    sheet::write(path, &columns, &rows, FACE_PX)?;
-    let what = "cubes unfolded: -X +Z +X -Z in a row, +Y above, -Y below; \"white\": the value shown as white";
-    output::note(global, format!("{}: {what}", output::shown(path)));
-    Ok(())
+    Sheet { tile: [4 * FACE_PX, 3 * FACE_PX], rows }
 }
 
-/// The six faces that the field's coefficients describe at a place (in r): visibility, or radiance in linear RGB.
-fn reconstruct(field: &ShadowField, position: DVec3) -> Cell {
+/// The cube that the field's coefficients describe at a place (in r): visibility, or radiance in linear RGB; NaN beside
+/// its faces.
+fn unfolded(field: &ShadowField, position: DVec3) -> Vec<[f32; 3]> {
     let bands = field.header.bands;
-    let count = coefficient_count(bands);
     let channels = field.header.kind.channels();
-    let found: Vec<Vec<f64>> = (0..channels)
-        .map(|channel| {
-            let mut out = vec![0.0; count];
-            field.lookup(position, channel, &mut out);
-            out
+    let channel = |channel| {
+        let mut out = vec![0.0; coefficient_count(bands)];
+        field.lookup(position, channel, &mut out);
+        out
+    };
+    let found: Vec<Vec<f64>> = (0..channels).map(channel).collect();
+    let texel = |x: usize, y: usize| {
+        let Some(face) = UNFOLDED[y / FACE_PX][x / FACE_PX] else { return [f32::NAN; 3] };
+        let [s, t] = [x, y].map(|at| cube::texel_st(at % FACE_PX, FACE_PX));
+        let mut basis = [0.0; MAX_COEFFICIENTS];
+        evaluate(bands, cube::direction(face, s, t), &mut basis);
+        [0, 1, 2].map(|c: usize| {
+            let sum: f64 = found[c.min(channels - 1)].iter().zip(&basis).map(|(c, y)| c * y).sum();
+            let value = if field.header.kind == FieldKind::Occlusion { 1.0 - sum } else { sum };
+            value.max(0.0) as f32
         })
-        .collect();
-    let mut cell = Vec::with_capacity(18 * FACE_PX * FACE_PX);
-    for face in 0..cube::FACE_COUNT {
-        for y in 0..FACE_PX {
-            for x in 0..FACE_PX {
-                let w = cube::direction(face, cube::texel_st(x, FACE_PX), cube::texel_st(y, FACE_PX));
-                let mut basis = [0.0; MAX_COEFFICIENTS];
-                evaluate(bands, w, &mut basis);
-                let value = |channel: usize| -> f64 {
-                    let sum: f64 = found[channel].iter().zip(&basis).map(|(c, y)| c * y).sum();
-                    if field.header.kind == FieldKind::Occlusion { 1.0 - sum } else { sum }
-                };
-                cell.extend((0..3).map(|c| value(c.min(channels - 1)).max(0.0) as f32));
-            }
-        }
-    }
-    cell
+    };
+    (0..3 * FACE_PX).flat_map(|y| (0..4 * FACE_PX).map(move |x| (x, y))).map(|(x, y)| texel(x, y)).collect()
 }

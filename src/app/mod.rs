@@ -16,7 +16,6 @@ mod outputs;
 mod profile;
 mod render;
 mod sheet;
-mod silhouette;
 mod source;
 #[cfg(feature = "view")]
 mod view;

@@ -16,7 +16,6 @@ use clap::Args;
 use serde_json::json;
 use std::path::PathBuf;
 
-/// Arguments of `profile`.
 #[derive(Args)]
 pub struct Arguments {
     /// Scene file, or the name of a built-in scene, whose passes are timed; without one a made-up merge of known size
@@ -36,12 +35,11 @@ pub struct Arguments {
     /// Number of timed runs of each, after one that warms up
     #[arg(long, default_value_t = 15, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=10_000))]
     runs: u32,
-    /// Write profile.csv and profile.json into this folder
+    /// Write profile.json into this folder
     #[arg(short, long = "output", alias = "out", value_name = "DIR")]
     out: Option<PathBuf>,
 }
 
-/// Measures and prints.
 pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
     let inputs: Vec<PathBuf> = arguments.scene.iter().flat_map(|path| scene::files::of_scene(path)).collect();
     if let Some(folder) = &arguments.out {
@@ -74,7 +72,6 @@ pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
     });
     if let Some(folder) = &arguments.out {
         text::make_folder(folder)?;
-        text::write(&folder.join("profile.csv"), text::csv(&document["origin"], &rows))?;
         text::write(&folder.join("profile.json"), format!("{document:#}\n"))?;
     }
     if global.json {
@@ -93,13 +90,9 @@ pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
         ("lower", "/ms/lower"),
         ("upper", "/ms/upper"),
         ("ns/pair", "/ns_a_pair"),
-        ("flops", "/work/flops"),
-        ("texels", "/work/fetches"),
-        ("bytes", "/work/bytes"),
+        ("flops", "/flops"),
         ("GFLOP/s", "/gflops"),
-        ("GB/s", "/gb_s"),
         ("arithmetic's share", "/arithmetic_share"),
-        ("reads' share", "/read_share"),
     ];
     table(&rows, &columns);
     if rows.iter().any(|row| row.pass == "merge" && row.ns_a_pair.is_none()) {

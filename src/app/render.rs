@@ -24,7 +24,6 @@ use std::time::{Duration, Instant};
 /// A picture that takes more memory than this is told in a line.
 const ANNOUNCED_BYTES: u64 = 1_000_000_000;
 
-/// Arguments of `render`.
 #[derive(Args)]
 pub struct Arguments {
     /// Scene file (see assets/scenes for examples), the name of a built-in one, a glTF file (.glb, .gltf) or an OBJ
@@ -115,7 +114,6 @@ impl PictureArguments {
     }
 }
 
-/// Renders a scene.
 pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
     let outputs = arguments.outputs()?;
     render(global, arguments).map_err(|error| outputs.after(error))
@@ -144,7 +142,6 @@ fn render(global: &Global, arguments: &Arguments) -> Result<()> {
     context.finish()
 }
 
-/// A scene that is being rendered.
 struct Rendering<'a> {
     global: &'a Global,
     arguments: &'a Arguments,
@@ -321,10 +318,8 @@ impl<'a> Rendering<'a> {
             "receiver_vertices": frame.map(Frame::receiver_vertex_count),
             "variant": frame.map(|frame| frame.variant().name),
             "lights": self.lights(),
-            "lookups": frame.map(|frame| frame.counts(&self.last())),
             "last_frame": last_frame,
             "device_bytes": frame.map(|_| self.context.device.allocated_bytes()),
-            "truth": self.arguments.reference.then_some("pixels"),
             "reference_standard_error": self.arguments.reference.then_some(self.worst_error),
             "error": error,
             "options": {

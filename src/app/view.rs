@@ -33,7 +33,6 @@ const HIDDEN_PERIOD: Duration = Duration::from_millis(200);
 /// Smallest window in which the overlay can be read.
 const LEAST_SIZE: PhysicalSize<u32> = PhysicalSize::new(160, 120);
 
-/// Arguments of `view`.
 #[derive(Args)]
 #[command(after_long_help = format!("Controls:\n{}", crate::view::input::help()))]
 pub struct Arguments {

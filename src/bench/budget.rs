@@ -37,60 +37,66 @@ impl Effort {
     }
 }
 
-/// T0 and T1 of a case, which do not depend on options of bake or merge.
-pub struct Truth {
+/// Vertices chosen at random, and their radiosity by ray casting (T0).
+pub struct Reference {
     pub vertices: Vec<Vertex>,
-    /// Radiosity of T0, by ray casting.
     pub t0: Vec<Radiosity>,
     /// Relative standard error of `t0`.
     pub t0_error: f64,
-    /// Radiosity of T1: exact factors, band-limited chain.
-    pub t1: Vec<Radiosity>,
-    /// Relative standard error of `t1`, from two halves of its rays.
-    pub t1_error: f64,
     /// Root mean square of `t0`: the unit of relative errors.
     pub unit: f64,
 }
 
-impl Truth {
-    pub fn new(case: &Case, effort: Effort, seed: u64) -> Self {
-        let placements = case.scene.at(case.time_s);
-        let shapes = RayMeshes::new(&case.scene);
-        let world = World::new(&case.scene, &shapes, &placements);
-        let vertices = sample_vertices(&case.scene, effort.vertices, seed);
-        let cast = RayCast { rays: effort.t0_rays, seed, distant: case.distant, ..Default::default() };
-        let lit = cast.run(&world, &vertices);
+impl Reference {
+    /// `count` vertices of the world's scene, or all if there are fewer.
+    pub fn new(world: &World<'_>, count: usize, cast: &RayCast) -> Self {
+        let vertices = sample_vertices(world.scene, count, cast.seed);
+        let lit = cast.run(world, &vertices);
         let t0: Vec<Radiosity> = lit.iter().map(|e| e.radiosity).collect();
-        let [first, second] = [1 << 32, 2 << 32].map(|half| {
-            let chain = ExactChain { rays: effort.t1_rays / 2, seed: seed ^ half, ..Default::default() };
-            chain.run(&world, &vertices)
-        });
         let unit = rms(&t0).max(f64::MIN_POSITIVE);
-        Truth {
-            unit,
-            t0,
-            t0_error: relative_error(&lit),
-            t1_error: difference(&first, &second, unit).rms / 2.0,
-            t1: first.iter().zip(&second).map(|(a, b)| std::array::from_fn(|c| (a[c] + b[c]) / 2.0)).collect(),
-            vertices,
-        }
-    }
-
-    /// Whether there is anything to compare.
-    pub fn check(&self, case: &Case) -> Result<()> {
-        if self.t0.as_flattened().iter().any(|c| *c > 0.0) {
-            return Ok(());
-        }
-        let what = format!(
-            "no light reaches any of the {} judged vertices, so there is nothing to compare",
-            self.vertices.len()
-        );
-        Err(Error::Input(format!("{}: {what}", case.name)))
+        Reference { vertices, t0, t0_error: relative_error(&lit), unit }
     }
 
     /// Difference to T0 relative to its root mean square.
     pub fn error(&self, of: &[Radiosity]) -> VertexDifference {
         difference(of, &self.t0, self.unit)
+    }
+}
+
+/// T0 and T1 of a case, which do not depend on options of bake or merge.
+pub struct Truth {
+    pub reference: Reference,
+    /// Radiosity of T1: exact factors, band-limited chain.
+    pub t1: Vec<Radiosity>,
+    /// Relative standard error of `t1`, from two halves of its rays.
+    pub t1_error: f64,
+}
+
+impl Truth {
+    pub fn new(case: &Case, effort: Effort, seed: u64) -> Self {
+        let shapes = RayMeshes::new(&case.scene);
+        let world = World::new(&case.scene, &shapes, &case.scene.at(case.time_s));
+        let cast = RayCast { rays: effort.t0_rays, seed, distant: case.distant, ..Default::default() };
+        let reference = Reference::new(&world, effort.vertices, &cast);
+        let [first, second] = [1 << 32, 2 << 32].map(|half| {
+            let chain = ExactChain { rays: effort.t1_rays / 2, seed: seed ^ half, ..Default::default() };
+            chain.run(&world, &reference.vertices)
+        });
+        Truth {
+            t1_error: difference(&first, &second, reference.unit).rms / 2.0,
+            t1: first.iter().zip(&second).map(|(a, b)| std::array::from_fn(|c| (a[c] + b[c]) / 2.0)).collect(),
+            reference,
+        }
+    }
+
+    /// Whether there is anything to compare.
+    pub fn check(&self, case: &Case) -> Result<()> {
+        if self.reference.t0.as_flattened().iter().any(|c| *c > 0.0) {
+            return Ok(());
+        }
+        let count = self.reference.vertices.len();
+        let what = format!("no light reaches any of the {count} judged vertices, so there is nothing to compare");
+        Err(Error::Input(format!("{}: {what}", case.name)))
     }
 }
 
@@ -141,29 +147,30 @@ pub struct Budget {
 /// same merge with sharp lights.
 pub fn budget(bench: &Bench<'_>, case: &Case, truth: &Truth, options: frame::Options) -> Result<Budget> {
     let placements = case.scene.at(case.time_s);
+    let reference = &truth.reference;
     let options = frame::Options { lights: Lights::Sh, ..options };
     let wide = frame::Options { bake: crate::bake::Options { storage: Storage::F32, ..options.bake }, ..options };
-    let t2 = select(&bench.frame(&case.scene, wide)?.twin(&placements)?, &truth.vertices);
+    let t2 = select(&bench.frame(&case.scene, wide)?.twin(&placements)?, &reference.vertices);
     let mut frame = bench.frame(&case.scene, options)?;
     frame.render(&placements, None)?;
-    let t3 = device_radiosity(&frame, &truth.vertices)?;
+    let t3 = device_radiosity(&frame, &reference.vertices)?;
     let sharp_total = if has_sharp(&case.scene, Lights::Sharp) {
         let mut frame = bench.frame(&case.scene, frame::Options { lights: Lights::Sharp, ..options })?;
         frame.render(&placements, None)?;
-        Some(truth.error(&device_radiosity(&frame, &truth.vertices)?))
+        Some(reference.error(&device_radiosity(&frame, &reference.vertices)?))
     } else {
         None
     };
-    let between = |a: &[Radiosity], b: &[Radiosity]| difference(a, b, truth.unit);
+    let between = |a: &[Radiosity], b: &[Radiosity]| difference(a, b, reference.unit);
     Ok(Budget {
         case: case.name.clone(),
-        vertices: truth.vertices.len(),
-        t0_error: truth.t0_error,
+        vertices: reference.vertices.len(),
+        t0_error: reference.t0_error,
         t1_error: truth.t1_error,
-        bands: between(&truth.t0, &truth.t1),
+        bands: between(&reference.t0, &truth.t1),
         sampling: between(&truth.t1, &t2),
         arithmetic_and_storage: between(&t2, &t3),
-        total: between(&truth.t0, &t3),
+        total: between(&reference.t0, &t3),
         sharp_total,
     })
 }

@@ -2,7 +2,7 @@
 //! sees.
 
 use super::Bench;
-use super::budget::{Effort, Truth};
+use super::budget::{Effort, Reference};
 use super::cases::Case;
 use super::figures::{Radiosity, VertexDifference, difference, rms};
 use crate::truth::pixels::lit_points;
@@ -25,6 +25,12 @@ pub enum JudgedAt {
     Pixels,
 }
 
+impl JudgedAt {
+    pub fn name(self) -> &'static str {
+        if self == JudgedAt::Pixels { "pixels" } else { "vertices" }
+    }
+}
+
 /// All points to light, and the truth of those that are compared.
 pub struct Judged {
     pub place: JudgedAt,
@@ -38,11 +44,11 @@ pub struct Judged {
 }
 
 impl Judged {
-    pub fn vertices(world: &World<'_>, truth: &Truth) -> Self {
+    pub fn vertices(world: &World<'_>, reference: &Reference) -> Self {
         let points: Vec<_> = receiver_vertices(world.scene).into_iter().map(|v| (v, world.view(v))).collect();
         let at = |vertex| points.binary_search_by_key(vertex, |(key, _)| *key).expect("it is lit");
-        let chosen = truth.vertices.iter().map(at).collect();
-        Judged { place: JudgedAt::Vertices, points, chosen, t0: truth.t0.clone(), unit: truth.unit }
+        let chosen = reference.vertices.iter().map(at).collect();
+        Judged { place: JudgedAt::Vertices, points, chosen, t0: reference.t0.clone(), unit: reference.unit }
     }
 
     /// Pixels, chosen at random; `None` where the camera sees nothing that is lit.

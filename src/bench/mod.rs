@@ -1,34 +1,30 @@
 //! Measurements behind the figures in the documentation: what a picture's error is made of, what run time buys, and
 //! what keeps the numbers bounded. `docs/measured.md` has the results.
 
-// Fields of rows of results are keys of CSV and JSON; what their names say needs no comment.
+// Fields of rows of results are keys of JSON; what their names say needs no comment.
 #![allow(missing_docs)]
 
 pub mod budget;
 pub mod cases;
 pub mod ceilings;
 pub mod figures;
-pub mod house;
 pub mod judged;
-pub mod pictures;
 pub mod profile;
 pub mod rival;
 pub mod scaling;
 pub mod shadow_map;
 pub mod skips;
 pub mod stability;
-pub mod sweep;
 pub mod time_error;
 pub mod town;
-pub mod trials;
 
 use crate::bake::Baker;
 use crate::bake::cache::Cache;
 use crate::bounce::Bounces;
 use crate::error::Result;
 use crate::frame::{self, Frame};
+use crate::gpu::Timing;
 use crate::scene::Scene;
-use serde_json::Value;
 
 /// Shared input of all measurements.
 #[derive(Clone)]
@@ -43,8 +39,6 @@ pub struct Bench<'b> {
     pub quick: bool,
     /// Seed of vertices and rays.
     pub seed: u64,
-    /// Device, driver, version, options and revision, for the head of every result file.
-    pub origin: Value,
 }
 
 impl Bench<'_> {
@@ -57,7 +51,12 @@ impl Bench<'_> {
     }
 }
 
-/// The options that sweeps vary: the program's defaults, with a picture so small that drawing costs nothing.
+/// Device time of the merge in milliseconds, sharp lights included.
+pub fn merge_ms(timings: &[Timing]) -> f64 {
+    timings.iter().filter(|t| ["merge", "sharp"].contains(&t.pass.as_str())).map(|t| t.milliseconds).sum()
+}
+
+/// The options that are measured: the program's defaults, with a picture so small that drawing costs nothing.
 pub fn default_options() -> frame::Options {
     // Frames are timed at rest: each must merge everything.
     let skip = crate::lists::skip::Skip::without("unmoved");

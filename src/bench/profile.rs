@@ -4,27 +4,15 @@ use super::Bench;
 use super::ceilings::Ceilings;
 use super::figures::{Spread, spread};
 use crate::draw::Antialias;
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::frame::{self, Frame};
-use crate::gpu::census::Census;
-use crate::merge::Merge;
-use crate::merge::variant::{MergePermutation, Variant};
+use crate::gpu::census;
+use crate::merge::variant::Variant;
 use crate::merge::workload::Workload;
 use crate::scene::{Lights, Scene};
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::time::Instant;
-
-/// Work of a merge for a pair of vertex and occluder, counted in the SPIR-V of the loop's body.
-#[derive(Clone, Copy, Debug, Serialize)]
-pub struct Work {
-    /// Float multiplications and additions.
-    pub flops: u32,
-    /// Texels fetched, and samples taken by a sampler.
-    pub fetches: u32,
-    /// Bytes fetched and loaded.
-    pub bytes: u32,
-}
 
 /// One variant of one pass.
 #[derive(Clone, Debug, Default, Serialize)]
@@ -40,15 +28,12 @@ pub struct ProfileRow {
     /// Nanoseconds a pair of vertex and occluder. Only merges have this and the values below, and only where the time
     /// is not mostly that of starting a dispatch (see [`Ceilings::resolve`]).
     pub ns_a_pair: Option<f64>,
-    pub work: Option<Work>,
+    /// Float multiplications and additions a pair, counted in the SPIR-V of the loop's body.
+    pub flops: Option<u32>,
     /// Multiplications and additions reached, in 10^9 a second.
     pub gflops: Option<f64>,
-    /// Bytes fetched and loaded, caches included, in 10^9 a second.
-    pub gb_s: Option<f64>,
     /// Time that the arithmetic alone would take at the device's ceiling, as a share of the time taken.
     pub arithmetic_share: Option<f64>,
-    /// Time that the reads alone would take at the device's ceiling, as a share of the time taken.
-    pub read_share: Option<f64>,
 }
 
 impl ProfileRow {
@@ -64,43 +49,18 @@ impl ProfileRow {
     }
 
     /// A merge of so many pairs of vertex and occluder.
-    fn merge(
-        case: &str,
-        variant: &str,
-        times: &[f64],
-        pairs: u64,
-        permutation: &MergePermutation,
-        census: &Census,
-        at_best: &Ceilings,
-    ) -> Self {
+    fn merge(case: &str, variant: &str, times: &[f64], pairs: u64, flops: u32, at_best: &Ceilings) -> Self {
         let row = ProfileRow::timed(case, "merge", variant, times);
-        let (quad_bytes, quad_rate) = match permutation.field_format() {
-            ash::vk::Format::R16G16B16A16_SFLOAT => (8, at_best.texel_halves_giga),
-            _ => (16, at_best.texel_packed_giga),
-        };
-        let bytes_of = |name: &str| match name {
-            "field_quads" => quad_bytes,
-            "entries" => 4,
-            _ => 16,
-        };
-        let fetched: u32 = census.fetches.iter().map(|(name, count)| count * bytes_of(name)).sum();
-        let loaded = census.block_bytes;
-        let work = Work { flops: census.flops, fetches: census.fetch_count(), bytes: fetched + loaded };
-        let quads = census.fetches.get("field_quads").copied().unwrap_or(0);
         // Per pair: one a nanosecond is 10^9 a second.
         let ns = row.ms.median * 1e6 / pairs.max(1) as f64;
-        let read_ns = f64::from(quads) / quad_rate
-            + f64::from(work.fetches - quads) / at_best.texel_packed_giga
-            + f64::from(loaded) / 8.0 / at_best.storage_giga;
+        let gflops = f64::from(flops) / ns;
         // Rates are unknown where a scene has few vertices.
         let rate = |value: f64| (at_best.resolve(row.ms.median) && pairs > 0).then_some(value);
         ProfileRow {
             ns_a_pair: rate(ns),
-            work: Some(work),
-            gflops: rate(f64::from(work.flops) / ns),
-            gb_s: rate(f64::from(work.bytes) / ns),
-            arithmetic_share: rate(f64::from(work.flops) / at_best.gflops / ns),
-            read_share: rate(read_ns / ns),
+            flops: Some(flops),
+            gflops: rate(gflops),
+            arithmetic_share: rate(gflops / at_best.gflops),
             ..row
         }
     }
@@ -115,25 +75,12 @@ pub fn made_up(
     at_best: &Ceilings,
 ) -> Result<Vec<ProfileRow>> {
     let library = bench.baker.library();
-    let mut merges = Vec::new();
-    for &variant in chosen {
-        let merge = Merge::new(bench.baker.device(), library, workload.permutation(variant))?;
-        merges.push((variant, merge, workload.inputs(variant)?, Vec::new()));
-    }
-    for run in 0..=runs {
-        for (_, merge, inputs, times) in &mut merges {
-            let milliseconds = workload.run(merge, inputs)?;
-            if run > 0 {
-                times.push(milliseconds);
-            }
-        }
-    }
     let case = format!("{} x {}", workload.vertex_count, workload.occluder_count);
     let mut rows = Vec::new();
-    for (variant, _, _, times) in merges {
-        let permutation = workload.permutation(variant);
-        let census = Census::new(&library.shader(&permutation.row())?)?;
-        rows.push(ProfileRow::merge(&case, variant.name, &times, workload.pairs(), &permutation, &census, at_best));
+    for (variant, times) in chosen.iter().zip(workload.time(library, chosen, runs)?) {
+        let times = times.ok_or_else(|| Error::Failed(format!("the driver does not compile {}", variant.name)))?;
+        let flops = census::flops(&library.shader(&workload.permutation(*variant).row())?)?;
+        rows.push(ProfileRow::merge(&case, variant.name, &times, workload.pairs(), flops, at_best));
     }
     Ok(rows)
 }
@@ -167,10 +114,9 @@ pub fn scene(
     }
     let mut rows = Vec::new();
     for (variant, frame, times) in &merges {
-        let permutation = frame.permutation();
-        let census = Census::new(&bench.baker.library().shader(&permutation.row())?)?;
+        let flops = census::flops(&bench.baker.library().shader(&frame.permutation().row())?)?;
         let pairs = 64 * frame.merged().merged_entries as u64;
-        rows.push(ProfileRow::merge(name, variant.name, times, pairs, &permutation, &census, at_best));
+        rows.push(ProfileRow::merge(name, variant.name, times, pairs, flops, at_best));
     }
     let mut frame = bench.frame(scene, options)?;
     let ways = [Antialias::Samples, Antialias::Outlines, Antialias::None];

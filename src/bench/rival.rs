@@ -8,13 +8,12 @@
 //! frame of ours draws its picture, and the rivals are given what each pixel shows and light that; the time of a plain
 //! drawing is added to theirs.
 
-use super::budget::{Truth, device_radiosity};
+use super::budget::{Reference, device_radiosity};
 use super::cases::Case;
 use super::figures::{Radiosity, Spread, VertexDifference, along, crossing, spread};
 use super::judged::{Judged, JudgedAt, PIXEL_SIZE};
 use super::shadow_map::{Filter, ShadowMaps, maps_apply};
-use super::sweep;
-use super::{Bench, default_options};
+use super::{Bench, default_options, merge_ms};
 use crate::draw::Shading;
 use crate::error::Result;
 use crate::frame::{self, Frame};
@@ -49,13 +48,6 @@ pub struct MapPoint {
     pub error: VertexDifference,
 }
 
-impl MapPoint {
-    /// Name in tables: `hard map 512`.
-    pub fn title(&self) -> String {
-        format!("{} map {}", if self.filter == Filter::Hard { "hard" } else { "PCSS" }, self.map_px)
-    }
-}
-
 /// Merge, ray casting and shadow maps on one case.
 #[derive(Clone, Debug, Serialize)]
 pub struct Comparison {
@@ -65,9 +57,6 @@ pub struct Comparison {
     pub place: JudgedAt,
     #[serde(rename = "point_count")]
     pub points: usize,
-    /// Threads of the ray caster.
-    #[serde(rename = "thread_count")]
-    pub threads: usize,
     /// How the merge takes the lights; none where no light can be sharp.
     pub lights: Option<Lights>,
     /// Where sharp lights are evaluated.
@@ -96,19 +85,6 @@ pub struct Comparison {
     /// Ratio of that wall time to the merge's device time, without lists, uploads and waiting.
     #[serde(rename = "merge_speed_up_at_equal_rms_ratio")]
     pub merge_speed_up_at_equal_rms: Option<f64>,
-}
-
-impl Comparison {
-    /// Name of the merge in tables.
-    pub fn merge_title(&self) -> &'static str {
-        match (self.lights, self.place, self.shading) {
-            (None, ..) => "merge",
-            (Some(Lights::Sh), ..) => "lights in SH",
-            (Some(Lights::Sharp), JudgedAt::Vertices, _) => "sharp lights",
-            (Some(Lights::Sharp), JudgedAt::Pixels, Shading::Vertex) => "sharp lights by vertex",
-            (Some(Lights::Sharp), JudgedAt::Pixels, Shading::Pixel) => "sharp lights by pixel",
-        }
-    }
 }
 
 /// The merge with one way to take the lights, and its times in milliseconds, round by round.
@@ -154,7 +130,7 @@ impl Merged {
             let timings = self.frame.render(placements, white)?;
             if warm {
                 self.walls.push(started.elapsed().as_secs_f64() * 1e3);
-                self.merges.push(sweep::merge_ms(&timings));
+                self.merges.push(merge_ms(&timings));
             }
         }
         Ok(())
@@ -186,12 +162,18 @@ impl Merged {
         let rival_ms = rays_at_equal_rms.map(|rays| along(&times, rays));
         let frame_wall_ms = spread(&self.walls);
         let merge_ms = spread(&self.merges);
-        let mut comparison = Comparison {
+        let way = match (self.lights, judged.place, self.shading) {
+            (None, ..) => "merge",
+            (Some(Lights::Sh), ..) => "lights in SH",
+            (Some(Lights::Sharp), JudgedAt::Vertices, _) => "sharp lights",
+            (Some(Lights::Sharp), JudgedAt::Pixels, Shading::Vertex) => "sharp lights by vertex",
+            (Some(Lights::Sharp), JudgedAt::Pixels, Shading::Pixel) => "sharp lights by pixel",
+        };
+        Ok(Comparison {
             case: case.name.clone(),
-            title: String::new(),
+            title: format!("{}, {way} at {}", case.name, judged.place.name()),
             place: judged.place,
             points: judged.points.len(),
-            threads: rayon::current_num_threads(),
             lights: self.lights,
             shading: self.shading,
             merge_error,
@@ -204,20 +186,19 @@ impl Merged {
             frame_wall_ms,
             merge_ms,
             rival: rival.to_vec(),
-        };
-        let place = if judged.place == JudgedAt::Pixels { "pixels" } else { "vertices" };
-        comparison.title = format!("{}, {} at {place}", case.name, comparison.merge_title());
-        Ok(comparison)
+        })
     }
 }
 
 /// Measures merge, shadow maps and ray casting in turns, at vertices and at pixels: where a light can be sharp, with
 /// sharp lights and with lights in SH, at pixels also with sharp lights by vertex.
-pub fn compare(bench: &Bench<'_>, case: &Case, truth: &Truth) -> Result<Vec<Comparison>> {
+pub fn compare(bench: &Bench<'_>, case: &Case, reference: &Reference) -> Result<Vec<Comparison>> {
     let shapes = RayMeshes::new(&case.scene);
     let world = World::new(&case.scene, &shapes, &case.scene.at(case.time_s));
     let mut comparisons = Vec::new();
-    for judged in std::iter::once(Judged::vertices(&world, truth)).chain(Judged::pixels(bench, &world, case.distant)) {
+    for judged in
+        std::iter::once(Judged::vertices(&world, reference)).chain(Judged::pixels(bench, &world, case.distant))
+    {
         comparisons.extend(compare_at(bench, case, &shapes, &judged)?);
     }
     Ok(comparisons)
@@ -257,8 +238,7 @@ fn compare_at(bench: &Bench<'_>, case: &Case, shapes: &RayMeshes, judged: &Judge
         .map(|((&rays, walls), found)| RivalPoint { rays, wall_ms: with_drawing(&walls), error: judged.error(found) })
         .collect();
     let maps = maps.points(with_drawing);
-    let place = if judged.place == JudgedAt::Pixels { "pixels" } else { "vertices" };
-    (bench.progress)(&format!("{}: merge against its rivals measured at {place}", case.name));
+    (bench.progress)(&format!("{}: merge against its rivals measured at {}", case.name, judged.place.name()));
     merged.iter().map(|merged| merged.comparison(case, judged, &rival, &maps)).collect()
 }
 

@@ -1,20 +1,15 @@
 //! `bench scaling`: time and memory of a frame as vertices, entities and lights increase.
 
-use super::budget::device_radiosity;
-use super::figures::{Radiosity, Spread, difference, rms, spread};
-use super::sweep::merge_ms;
+use super::budget::{Reference, device_radiosity};
+use super::figures::{Spread, spread};
 use super::town::{Town, moved};
-use super::{Bench, default_options};
+use super::{Bench, default_options, merge_ms};
 use crate::error::{Error, Result};
 use crate::frame::{self, Frame};
-use crate::lists::gather::Counts;
 use crate::lists::skip::Skip;
 use crate::scene::Placement;
-use crate::text::write_rows;
-use crate::truth::{RayCast, RayMeshes, World, sample_vertices};
+use crate::truth::{RayCast, RayMeshes, World};
 use serde::Serialize;
-use serde_json::json;
-use std::path::Path;
 use std::time::Instant;
 
 /// Measurements at one size along one axis.
@@ -40,33 +35,25 @@ pub struct ScalingPoint {
     pub rest_ms: Spread,
     /// Lookups per vertex.
     pub entries_a_vertex: f64,
-    /// Lookups that the lists skip.
-    pub counts: Counts,
     /// Relative root mean square error of a sample of vertices against ray casting.
     pub error: f64,
     pub device_bytes: u64,
-    /// Resident memory of the process in bytes, if the system reports it. On a software device it includes device
-    /// memory.
-    pub resident_bytes: Option<u64>,
 }
 
-/// Measures the `chosen` axes (all if empty), and writes `scaling.csv` and `scaling.json` into `folder`.
-pub fn run(bench: &Bench<'_>, folder: &Path, chosen: &[String]) -> Result<Vec<ScalingPoint>> {
+/// Measures the `chosen` axes (all if empty).
+pub fn run(bench: &Bench<'_>, chosen: &[String]) -> Result<Vec<ScalingPoint>> {
     let mut axes = axes(bench.quick);
     if let Some(name) = chosen.iter().find(|name| !axes.iter().any(|(axis, _)| axis == name)) {
         let names: Vec<&str> = axes.iter().map(|(axis, _)| *axis).collect();
         return Err(Error::Usage(format!("unknown axis \"{name}\" ({})", names.join(", "))));
     }
     axes.retain(|(axis, _)| chosen.is_empty() || chosen.iter().any(|name| name == axis));
-    crate::text::make_folder(folder)?;
     let mut points = Vec::new();
     for (axis, towns) in &axes {
         for &town in towns {
             points.push(point(bench, axis, town)?);
         }
     }
-    let origin = json!({ "origin": bench.origin, "quick": bench.quick });
-    write_rows(folder, "scaling", &origin, &points)?;
     Ok(points)
 }
 
@@ -96,12 +83,11 @@ fn axes(quick: bool) -> Vec<(&'static str, Vec<Town>)> {
 fn error(bench: &Bench<'_>, frame: &mut Frame, placements: &[Placement]) -> Result<f64> {
     let scene = frame.scene().clone();
     let shapes = RayMeshes::new(&scene);
-    let vertices = sample_vertices(&scene, if bench.quick { 64 } else { 256 }, bench.seed);
+    let world = World::new(&scene, &shapes, placements);
     let cast = RayCast { rays: if bench.quick { 256 } else { 1024 }, seed: bench.seed, ..Default::default() };
-    let lit = cast.run(&World::new(&scene, &shapes, placements), &vertices);
-    let truth: Vec<Radiosity> = lit.iter().map(|e| e.radiosity).collect();
+    let reference = Reference::new(&world, if bench.quick { 64 } else { 256 }, &cast);
     frame.render(placements, None)?;
-    Ok(difference(&device_radiosity(frame, &vertices)?, &truth, rms(&truth).max(f64::MIN_POSITIVE)).rms)
+    Ok(reference.error(&device_radiosity(frame, &reference.vertices)?).rms)
 }
 
 fn point(bench: &Bench<'_>, axis: &'static str, town: Town) -> Result<ScalingPoint> {
@@ -143,8 +129,6 @@ fn point(bench: &Bench<'_>, axis: &'static str, town: Town) -> Result<ScalingPoi
     })?;
     let (rest, _) = timed(&mut frame, &|_| placements.clone())?;
     let merge_ms = spread(&merges);
-    // This is read before ray casting, which needs memory of its own.
-    let resident_bytes = resident_bytes();
     (bench.progress)(&format!("{axis}: {vertices} vertices, {} entities measured", scene.entities.len()));
     Ok(ScalingPoint {
         axis,
@@ -157,16 +141,7 @@ fn point(bench: &Bench<'_>, axis: &'static str, town: Town) -> Result<ScalingPoi
         one_moves_ms: spread(&one),
         rest_ms: spread(&rest),
         entries_a_vertex,
-        counts: frame.counts(&placements),
         error: error(bench, &mut frame, &placements)?,
         device_bytes: bench.baker.device().allocated_bytes(),
-        resident_bytes,
     })
-}
-
-/// Resident memory of this process, where the system has a file that tells.
-fn resident_bytes() -> Option<u64> {
-    let status = std::fs::read_to_string("/proc/self/status").ok()?;
-    let line = status.lines().find_map(|line| line.strip_prefix("VmRSS:"))?;
-    Some(line.trim().trim_end_matches(" kB").trim().parse::<u64>().ok()? * 1024)
 }

@@ -1,22 +1,18 @@
 //! `bench skip`: what each skip saves and what it does to the error against ray casting, with it off and on in turns.
 
-use super::budget::device_radiosity;
+use super::budget::{Reference, device_radiosity};
 use super::cases::{self, Case};
-use super::figures::{Radiosity, Spread, VertexDifference, difference, rms, spread};
-use super::sweep::merge_ms;
+use super::figures::{Spread, VertexDifference, difference, spread};
 use super::town::{Town, moved};
-use super::{Bench, default_options, house};
+use super::{Bench, default_options, merge_ms};
 use crate::draw::Antialias;
 use crate::error::Result;
 use crate::frame::{self, Frame};
-use crate::lists::gather::Counts;
-use crate::lists::skip::{EPS, Skip};
+use crate::lists::skip::{EPS, Skip, SkipRow, TABLE};
 use crate::scene::{Placement, Scene};
-use crate::truth::raycast::{Distant, relative_error};
-use crate::truth::{RayCast, RayMeshes, Vertex, World, sample_vertices};
+use crate::truth::raycast::Distant;
+use crate::truth::{RayCast, RayMeshes, World};
 use serde::Serialize;
-use serde_json::json;
-use std::path::Path;
 use std::time::Instant;
 
 /// A frame without drawing, with the skip off or on.
@@ -31,7 +27,6 @@ pub struct Side {
     pub entries: usize,
     /// Against ray casting.
     pub error: VertexDifference,
-    pub field_bytes: u64,
 }
 
 #[derive(Clone, Debug, Serialize)]
@@ -48,11 +43,6 @@ pub struct SkipCost {
     pub times_faster: f64,
     /// Largest change of a vertex, relative to the root mean square of T0.
     pub change: VertexDifference,
-    /// Lookups that the lists leave off, all skips on.
-    pub counts: Counts,
-    /// Lookups that this skip left off: (cluster, chain, entity) triples, a cluster being 64 vertices. `None` where it
-    /// does not work on lists.
-    pub left_off_count: Option<u64>,
 }
 
 /// Motion of the scene while a skip is timed.
@@ -66,63 +56,26 @@ enum Motion {
     AllMove,
 }
 
-/// How each skip that has a switch is timed.
-const TIMED: [(&str, Motion); 9] = [
-    ("horizon", Motion::AtRest),
-    ("cones", Motion::AtRest),
-    ("behind", Motion::AtRest),
-    ("caps", Motion::AtRest),
-    ("passed", Motion::AtRest),
-    ("covered", Motion::AtRest),
-    ("static", Motion::AtRest),
-    ("unmoved", Motion::OneMoves),
-    ("hidden", Motion::AllMove),
-];
-
-/// The number of entries that a skip left off the lists; `None` where it does not work on lists.
-fn left_off(name: &str, counts: &Counts) -> Option<u64> {
-    match name {
-        "horizon" => Some(counts.below_horizon),
-        "cones" => Some(counts.apart),
-        "behind" => Some(counts.behind_light),
-        "caps" => Some(counts.caps),
-        "passed" => Some(counts.passed_by),
-        "covered" => Some(counts.covered),
-        "static" => Some(counts.own),
-        "hidden" => Some(counts.hidden),
-        "eps" => Some(counts.below_eps),
-        _ => None,
-    }
-}
-
-/// Measures every skip in some cases, and writes `skip.csv` and `skip.json` into `folder`.
-pub fn run(bench: &Bench<'_>, folder: &Path, cases: &[Case]) -> Result<Vec<SkipCost>> {
-    crate::text::make_folder(folder)?;
+/// Measures every skip in some cases.
+pub fn run(bench: &Bench<'_>, cases: &[Case]) -> Result<Vec<SkipCost>> {
     let mut rows = Vec::new();
     for case in cases {
         rows.extend(of_case(bench, case)?);
     }
-    let origin = json!({
-        "origin": bench.origin, "quick": bench.quick, "seed": bench.seed,
-        "errors": "relative to the root mean square of T0 over the judged vertices",
-    });
-    crate::text::write_rows(folder, "skip", &origin, &rows)?;
     Ok(rows)
 }
 
+/// The built-in scenes and towns, of which a quick run takes two.
 pub fn all(quick: bool) -> Result<Vec<Case>> {
     let town = |things, lights, cells| -> Result<Case> {
         let scene = Town { things, lights, cells, receive: true }.scene()?;
         Ok(Case::at_start(format!("town of {things}, {lights} lights"), scene, Distant::Exact))
     };
-    // A storey of a house: a floor with things on it below a ceiling, flat lamps between that shine down, of which most
-    // are out, and an attic full of things.
-    let house = Case::at_start("house".into(), house::scene()?, Distant::Exact);
     if quick {
-        return Ok(vec![cases::scene("torus_over_plane")?, town(64, 4, 80)?, house]);
+        return Ok(vec![cases::scene("torus_over_plane")?, town(64, 4, 80)?]);
     }
     let mut cases = cases::scenes()?;
-    cases.extend([town(64, 4, 160)?, town(256, 8, 160)?, house]);
+    cases.extend([town(64, 4, 160)?, town(256, 8, 160)?]);
     Ok(cases)
 }
 
@@ -131,34 +84,31 @@ fn of_case(bench: &Bench<'_>, case: &Case) -> Result<Vec<SkipCost>> {
     let placements = case.scene.at(case.time_s);
     let shapes = RayMeshes::new(&case.scene);
     let world = World::new(&case.scene, &shapes, &placements);
-    let vertices = sample_vertices(&case.scene, if bench.quick { 500 } else { 1500 }, bench.seed);
     let rays = if bench.quick { 512 } else { 4096 };
     let cast = RayCast { rays, seed: bench.seed, distant: case.distant, ..Default::default() };
-    let lit = cast.run(&world, &vertices);
-    let truth: Vec<Radiosity> = lit.iter().map(|e| e.radiosity).collect();
-    let judge = Judge { unit: rms(&truth).max(f64::MIN_POSITIVE), vertices, truth };
-    (bench.progress)(&format!("{}: relative standard error of T0 {:.1e}", case.name, relative_error(&lit)));
+    let reference = Reference::new(&world, if bench.quick { 500 } else { 1500 }, &cast);
+    (bench.progress)(&format!("{}: relative standard error of T0 {:.1e}", case.name, reference.t0_error));
 
     let at_rest = default_options();
     let kept = frame::Options { skip: Skip::ALL, ..at_rest };
     let shown = frame::Options { size: PICTURE, antialias: Antialias::usual(bench.baker.device()), ..kept };
     let mut rows = Vec::new();
-    for (name, motion) in TIMED {
-        let (what, base) = match motion {
-            Motion::AtRest => (name.to_owned(), at_rest),
-            Motion::OneMoves => (format!("{name}, one moves"), kept),
-            Motion::AllMove => (format!("{name}, all move"), shown),
+    for SkipRow { name, .. } in TABLE {
+        let (what, base, motion) = match *name {
+            "unmoved" => (format!("{name}, one moves"), kept, Motion::OneMoves),
+            "hidden" => (format!("{name}, all move"), shown, Motion::AllMove),
+            _ => ((*name).to_owned(), at_rest, Motion::AtRest),
         };
         let mut off = base;
         *off.skip.switch(name).expect("a skip with a switch") = false;
-        rows.push(judge.row(bench, case, &placements, [name, &what], [off, base], motion)?);
+        rows.push(row(bench, case, &reference, &placements, &what, [off, base], motion)?);
     }
     let what = format!("eps {EPS}");
     let without_eps = frame::Options { eps: 0.0, ..at_rest };
-    rows.push(judge.row(bench, case, &placements, ["eps", &what], [without_eps, at_rest], Motion::AtRest)?);
+    rows.push(row(bench, case, &reference, &placements, &what, [without_eps, at_rest], Motion::AtRest)?);
     let none = frame::Options { eps: 0.0, skip: Skip::NONE, ..at_rest };
     let what = "all but unmoved";
-    rows.push(judge.row(bench, case, &placements, [what, what], [none, at_rest], Motion::AtRest)?);
+    rows.push(row(bench, case, &reference, &placements, what, [none, at_rest], Motion::AtRest)?);
     Ok(rows)
 }
 
@@ -209,66 +159,41 @@ fn in_turns(
     Ok((walls, merges))
 }
 
-/// Truth that results are compared with.
-struct Judge {
-    unit: f64,
-    vertices: Vec<Vertex>,
-    truth: Vec<Radiosity>,
-}
-
-impl Judge {
-    /// One row: both sides in turns.
-    fn row(
-        &self,
-        bench: &Bench<'_>,
-        case: &Case,
-        placements: &[Placement],
-        [name, what]: [&str; 2],
-        [off, on]: [frame::Options; 2],
-        motion: Motion,
-    ) -> Result<SkipCost> {
-        let mut frames = [bench.frame(&case.scene, off)?, bench.frame(&case.scene, on)?];
-        let rounds = if bench.quick { 5 } else { 11 };
-        let (walls, merges) = in_turns(&mut frames, &movers(&case.scene, motion), placements, rounds, motion)?;
-        let entries = [frames[0].merged().merged_entries, frames[1].merged().merged_entries];
-        let mut found = Vec::new();
-        for frame in &mut frames {
-            frame.render(placements, None)?;
-            found.push(device_radiosity(frame, &self.vertices)?);
-        }
-        let side = |i: usize| Side {
-            frame_ms: spread(&walls[i]),
-            merge_ms: spread(&merges[i]),
-            entries: entries[i],
-            error: difference(&found[i], &self.truth, self.unit),
-            field_bytes: frames[i].buffers.fields.size_bytes,
-        };
-        let off = side(0);
-        let on = side(1);
-        let counts = frames[1].counts(placements);
-        (bench.progress)(&format!("{}: {what} measured", case.name));
-        Ok(SkipCost {
-            case: case.name.clone(),
-            skip: what.to_owned(),
-            vertices: frames[0].receiver_vertex_count(),
-            times_faster: off.frame_ms.median / on.frame_ms.median,
-            change: difference(&found[0], &found[1], self.unit),
-            left_off_count: left_off(name, &counts),
-            counts,
-            off,
-            on,
-        })
+/// One row: both sides in turns.
+fn row(
+    bench: &Bench<'_>,
+    case: &Case,
+    reference: &Reference,
+    placements: &[Placement],
+    what: &str,
+    [off, on]: [frame::Options; 2],
+    motion: Motion,
+) -> Result<SkipCost> {
+    let mut frames = [bench.frame(&case.scene, off)?, bench.frame(&case.scene, on)?];
+    let rounds = if bench.quick { 5 } else { 11 };
+    let (walls, merges) = in_turns(&mut frames, &movers(&case.scene, motion), placements, rounds, motion)?;
+    let entries = [frames[0].merged().merged_entries, frames[1].merged().merged_entries];
+    let mut found = Vec::new();
+    for frame in &mut frames {
+        frame.render(placements, None)?;
+        found.push(device_radiosity(frame, &reference.vertices)?);
     }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::lists::skip::TABLE;
-
-    #[test]
-    fn every_switch_is_timed() {
-        let names: Vec<&str> = TABLE.iter().map(|row| row.name).collect();
-        assert_eq!(TIMED.map(|(name, _)| name)[..], names);
-    }
+    let side = |i: usize| Side {
+        frame_ms: spread(&walls[i]),
+        merge_ms: spread(&merges[i]),
+        entries: entries[i],
+        error: reference.error(&found[i]),
+    };
+    let off = side(0);
+    let on = side(1);
+    (bench.progress)(&format!("{}: {what} measured", case.name));
+    Ok(SkipCost {
+        case: case.name.clone(),
+        skip: what.to_owned(),
+        vertices: frames[0].receiver_vertex_count(),
+        times_faster: off.frame_ms.median / on.frame_ms.median,
+        change: difference(&found[0], &found[1], reference.unit),
+        off,
+        on,
+    })
 }

@@ -15,7 +15,7 @@ use half::f16;
 pub const F16: f64 = 2e-3;
 
 /// Lattice, bands and channels that are tried.
-pub const CASES: [(&str, usize, usize); 3] =
+const CASES: [(&str, usize, usize); 3] =
     [("cube:3x5,inner=0.3", 4, 1), ("cube:3x5,edges,inner=0.3", 3, 3), ("cube:1x1", 2, 3)];
 
 /// Assembles random numbers, some of them inside the solid. The largest error relative to 1 + what is wanted; infinite

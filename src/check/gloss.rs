@@ -9,7 +9,7 @@ use crate::frame::Frame;
 use crate::scene::Gloss;
 
 /// Filters of textures have eight bits between two texels, and texels of eleven bits.
-pub const FILTERED: f64 = 0.01;
+const FILTERED: f64 = 0.01;
 
 /// Compares what every vertex of a scene reflects at three roughnesses: of a mirror, whose pixels look the sky up, and
 /// of two rougher ones.

@@ -86,16 +86,9 @@ pub fn options() -> frame::Options {
     }
 }
 
-/// How device and twin agree on every lit vertex.
-#[derive(Clone, Copy, Debug)]
-pub struct Agreement {
-    /// Largest difference as a share of 1 + the brightest radiosity; infinite where a number is not finite.
-    pub worst: f64,
-    pub brightest: f64,
-}
-
-/// Lights the scene on the device and in f64.
-pub fn against_twin(frame: &mut Frame, placements: &[Placement]) -> Result<Agreement> {
+/// Lights the scene on the device and in f64: the largest difference of a lit vertex, as a share of 1 + the brightest
+/// radiosity; infinite where a number is not finite, or all is dark.
+pub fn against_twin(frame: &mut Frame, placements: &[Placement]) -> Result<f64> {
     frame.render(placements, None)?;
     let twin = frame.twin(placements)?;
     let mut worst = 0.0_f64;
@@ -110,9 +103,7 @@ pub fn against_twin(frame: &mut Frame, placements: &[Placement]) -> Result<Agree
             worst = worst.max(error);
         }
     }
-    // A dark scene shows nothing.
-    let worst = if brightest > 0.01 { worst } else { f64::INFINITY };
-    Ok(Agreement { worst, brightest })
+    Ok(if brightest > 0.01 { worst } else { f64::INFINITY })
 }
 
 /// A room that is open to the front, with a table, in which a ring moves.
@@ -138,7 +129,7 @@ entity = [
 const GLASS: &str = "[[entity]]\nmesh = \"ring\"\nposition = [0.317, 0.413, 0.519]\nscale = 0.5\nopacity = 0.6\n";
 
 /// The lattices that are tried besides the pinned one.
-pub const LATTICES: [&str; 4] = ["cube:5x3,inner=0.5,outer=5", "cube:1x1", "cube:5x3,edges", "cube:4x5"];
+const LATTICES: [&str; 4] = ["cube:5x3,inner=0.5,outer=5", "cube:1x1", "cube:5x3,edges", "cube:4x5"];
 
 pub fn rows(baker: &Baker, add: &mut dyn FnMut(CheckRow)) -> Result<()> {
     let mixed = scene(&format!("{MIXED}{GLASS}"))?;
@@ -149,13 +140,13 @@ pub fn rows(baker: &Baker, add: &mut dyn FnMut(CheckRow)) -> Result<()> {
     let cache = Cache::new(Some(folder.path()));
     let mut compare = |what: String, options: frame::Options| -> Result<()> {
         let mut frame = Frame::new(baker, &cache, &mixed, options, &|_, _, _| ())?;
-        let found = against_twin(&mut frame, &placements)?;
+        let worst = against_twin(&mut frame, &placements)?;
         let what = if options.variant.is_none_or(|v| v == frame.variant()) {
             what
         } else {
             format!("{what} (as {}: the device's limits)", frame.variant().name)
         };
-        add(CheckRow::new("merge", what, "of 1 + brightest", found.worst, ARITHMETIC));
+        add(CheckRow::new("merge", what, "of 1 + brightest", worst, ARITHMETIC));
         Ok(())
     };
     let base = options();
@@ -183,8 +174,8 @@ pub fn rows(baker: &Baker, add: &mut dyn FnMut(CheckRow)) -> Result<()> {
     for (what, z) in [("within a volume", 0.113), ("at the side of a volume", 0.987)] {
         let mut placements = room.at(0.0);
         placements[ring].position.z = z;
-        let found = against_twin(&mut frame, &placements)?;
-        add(CheckRow::new("merge", what, "of 1 + brightest", found.worst, ARITHMETIC));
+        let worst = against_twin(&mut frame, &placements)?;
+        add(CheckRow::new("merge", what, "of 1 + brightest", worst, ARITHMETIC));
     }
     Ok(())
 }

@@ -13,7 +13,7 @@ use crate::scene::Lights;
 
 /// Differences of f32 arithmetic: a place on a map is off by some 1e-6 of its edge, and the distance found there is
 /// divided by the half-width of a penumbra, which near an outline is a thousandth of the object's radius.
-pub const PENUMBRA: f64 = 1e-4;
+const PENUMBRA: f64 = 1e-4;
 
 /// Further entities beside [`MIXED`]: a light with an outline of its own, a small light, a ball that stands beyond it,
 /// a ring around it, a thin board in whose bounding sphere others stand, panels of every form, a spot, and a tube.
@@ -112,8 +112,8 @@ pub fn rows(baker: &Baker, add: &mut dyn FnMut(CheckRow)) -> Result<()> {
         ("no skip", frame::Options { skip: Skip::NONE, ..base }),
     ] {
         let mut frame = Frame::new(baker, &cache, &scene, options, &|_, _, _| ())?;
-        let found = against_twin(&mut frame, &placements)?;
-        add(CheckRow::new("sharp", what, "of 1 + brightest", found.worst, PENUMBRA));
+        let worst = against_twin(&mut frame, &placements)?;
+        add(CheckRow::new("sharp", what, "of 1 + brightest", worst, PENUMBRA));
     }
     Ok(())
 }

@@ -1,4 +1,4 @@
-//! The CPU twin of a frame's merge, and what its lists leave off.
+//! The CPU twin of a frame's merge.
 
 use super::Frame;
 use crate::bounce::twin::{TwinInput, TwinVertex};
@@ -6,7 +6,7 @@ use crate::error::Result;
 use crate::field::{Area, ShadowField, self_visibility};
 use crate::gpu::Buffer;
 use crate::layout::{CLUSTER_VERTICES, Cluster, ENTRY_ENTITIES, ListEntry};
-use crate::lists::gather::{self, Candidates, Counts};
+use crate::lists::gather::{self, Candidates};
 use crate::lists::incremental::{ClusterLists, State};
 use crate::lists::scope::Scope;
 use crate::merge::twin::{MergeObject, MergeTwin};
@@ -18,30 +18,8 @@ use crate::sharp::twin::{SharpLight, SharpObject, SharpTwin, SurfacePoint};
 use glam::DVec3;
 use std::collections::{BTreeSet, HashSet};
 use std::f64::consts::PI;
-use std::ops::Range;
 
 impl Frame {
-    /// Counts lookups that the lists of all clusters leave off, by reason, and bounds the light in them. It looks at
-    /// every cluster and entity, which no frame does.
-    pub fn counts(&self, placements: &[Placement]) -> Counts {
-        let entities = || indices(&self.scene, |entity| entity.occludes || entity.emits).into_iter();
-        let empty = |&entity: &usize| {
-            let Entity { mesh, emits, .. } = self.scene.entities[entity];
-            self.buffers.meshes[mesh].is_empty(emits)
-        };
-        let sights = self.sights(placements, &[self.whole()]).filter(|_| self.options.skip.hidden);
-        let triangles = |indices: Vec<Range<u32>>| indices.iter().map(|range| range.len() / 3).sum::<usize>();
-        let drawn = self.drawn_entities(placements, self.options.size).into_iter();
-        let undrawn: usize = drawn.map(|of| triangles(of.mesh.seen(None)) - triangles(of.indices)).sum();
-        Counts {
-            empty: entities().filter(empty).count() as u64,
-            unseen: entities().filter(|&entity| !self.groups.is_seen(entity)).count() as u64,
-            hidden: sights.map_or(0, |sights| self.work.lists.hidden_count(&sights) as u64),
-            undrawn: undrawn as u64,
-            ..self.work.lists.counts(&self.state(placements))
-        }
-    }
-
     /// Entities that stand on the list of any cluster of a receiver at this time.
     pub fn listed(&self, placements: &[Placement], receiver: usize) -> BTreeSet<usize> {
         self.work.lists.entities_on(&self.state(placements), receiver)

@@ -12,9 +12,7 @@
 
 pub use crate::layout::GROUP_CLUSTERS;
 use crate::layout::{self, ListEntry};
-pub use crate::lists::scene_bounds::{
-    ClusterBounds, Counts, EntityBounds, ListLight, OutlineView, SceneBounds, distance_key,
-};
+pub use crate::lists::scene_bounds::{ClusterBounds, EntityBounds, ListLight, OutlineView, SceneBounds, distance_key};
 use crate::lists::scope::{CullResult, Scope, SphereView};
 
 /// Whether clusters are as near one another as neighbours on a surface are, so that they make a group: a space-filling
@@ -57,45 +55,9 @@ impl Candidates {
     }
 }
 
-/// Appends the entries of one cluster. `candidates` are those of a group that the cluster belongs to, or all. Returns
-/// how many of the entries, at the front, are for sharp lights.
+/// Appends the entries of one cluster, light by light and at last the sky. `candidates` are those of a group that the
+/// cluster belongs to, or all. Returns how many of the entries, at the front, are for sharp lights.
 pub fn gather(scope: &Scope<'_>, candidates: &Candidates, out: &mut Vec<u32>) -> usize {
-    walk(scope, candidates, out, |_, _| ())
-}
-
-/// What of all that exists is left off the list of one cluster, and why.
-pub fn counts(scope: &Scope<'_>, receiver: u32) -> Counts {
-    let mut counts = Counts::default();
-    let mut dropped = 0.0;
-    walk(scope, &Candidates::all(scope.scene(), receiver), &mut Vec::new(), |result, lookups| {
-        counts.considered += lookups;
-        match result {
-            CullResult::Listed => {}
-            CullResult::Cap => counts.caps += lookups,
-            CullResult::Own => counts.own += lookups,
-            CullResult::BelowHorizon => counts.below_horizon += lookups,
-            CullResult::BehindLight => counts.behind_light += lookups,
-            CullResult::Apart => counts.apart += lookups,
-            CullResult::PassedBy => counts.passed_by += lookups,
-            CullResult::Covered => counts.covered += lookups,
-            CullResult::FacingAway => counts.facing_away += lookups,
-            CullResult::BelowEps(bound) => {
-                counts.below_eps += lookups;
-                dropped += bound;
-            }
-        }
-    });
-    Counts { dropped_bound: dropped, ..counts }
-}
-
-/// Goes through all chains of a cluster, light by light and at last the sky: appends what is listed, and tells of every
-/// entity and channel what becomes of it.
-fn walk(
-    scope: &Scope<'_>,
-    candidates: &Candidates,
-    out: &mut Vec<u32>,
-    mut tell: impl FnMut(CullResult, u64),
-) -> usize {
     let first = out.len();
     let mut sharp_count = 0;
     let spheres = &scope.scene().spheres;
@@ -105,74 +67,64 @@ fn walk(
         let (light, light_view) = light.unzip();
         results.clear();
         results.extend(candidates.occluders.iter().zip(&views).map(|(&occluder, view)| {
-            if scope.is_own(occluder as usize, sharp) {
-                return CullResult::Own;
+            if scope.is_own(occluder as usize, sharp) || !scope.may_block(view, light_view, sharp, radiance) {
+                return CullResult::LeftOff;
             }
-            let result = scope.occluder_result(view, light_view, sharp, radiance);
-            match light.filter(|light| sharp && result == CullResult::Listed && *light != occluder) {
+            match light.filter(|light| sharp && *light != occluder) {
                 Some(light) => scope.outline_result(occluder as usize, spheres[light as usize]),
-                None => result,
+                None => CullResult::Listed,
             }
         }));
     };
-    let occlude = |light: Option<u32>,
-                   sharp,
-                   chosen: &dyn Fn(u32) -> bool,
-                   results: &[CullResult],
-                   out: &mut Vec<u32>,
-                   tell: &mut dyn FnMut(_, _)| {
-        let occluders = candidates.occluders.iter().zip(views.iter().zip(results));
-        for (&entity, (view, &result)) in occluders.filter(|(j, _)| light != Some(**j) && chosen(**j)) {
-            let listed = result == CullResult::Listed;
-            let sheet = view.is_sheet();
-            let whole = (view.whole || sharp) && !sheet;
-            let cap = view.cap && !sharp && !sheet;
-            tell(if listed && !whole && !sheet { CullResult::Cap } else { result }, 1);
-            out.extend((listed && whole).then(|| ListEntry::Occlude { entity, light }.pack()));
-            out.extend((listed && sheet).then(|| ListEntry::Sheet { entity, light }.pack()));
-            out.extend((listed && cap).then(|| ListEntry::Cap { entity, light }.pack()));
-        }
-    };
+    let occlude =
+        |light: Option<u32>, sharp, chosen: &dyn Fn(u32) -> bool, results: &[CullResult], out: &mut Vec<u32>| {
+            let occluders = candidates.occluders.iter().zip(views.iter().zip(results));
+            let listed = occluders
+                .filter(|(j, (_, result))| light != Some(**j) && chosen(**j) && **result == CullResult::Listed);
+            for (&entity, (view, _)) in listed {
+                if view.is_sheet() {
+                    out.push(ListEntry::Sheet { entity, light }.pack());
+                    continue;
+                }
+                out.extend((view.whole || sharp).then(|| ListEntry::Occlude { entity, light }.pack()));
+                out.extend((view.cap && !sharp).then(|| ListEntry::Cap { entity, light }.pack()));
+            }
+        };
     let mut results = Vec::with_capacity(views.len());
     for light in &candidates.lights {
         let entity = light.entity;
         let view = scope.view(spheres[light.entity as usize]);
         let channels = if light.coloured { 3 } else { 1 };
         let sharp = light.sharp;
-        let mut result = scope.light_result(light, &view);
-        if result == CullResult::Listed {
-            chain(Some((entity, &view)), sharp, light.radiance, &mut results);
-            // One occluder that takes all of its light is enough.
-            result = results.iter().copied().find(|&result| result == CullResult::Covered).unwrap_or(result);
+        if !scope.may_light(light, &view) {
+            continue;
         }
-        tell(result, channels.into());
-        if result == CullResult::Listed {
-            occlude(Some(entity), sharp, &|_| true, &results, out, &mut tell);
-            out.extend((0..channels).map(|channel| {
-                let last = channel + 1 == channels;
-                ListEntry::Shine { entity, channel: light.coloured.then_some(channel), last }.pack()
-            }));
-            if sharp {
-                sharp_count = out.len() - first;
-            }
-        } else {
-            // Its occluders go with it; the bound of what is left off counts once.
-            let others = candidates.occluders.iter().filter(|&&j| j != entity).count();
-            tell(if let CullResult::BelowEps(_) = result { CullResult::BelowEps(0.0) } else { result }, others as u64);
+        chain(Some((entity, &view)), sharp, light.radiance, &mut results);
+        // One occluder that takes all of its light is enough.
+        if results.contains(&CullResult::Covers) {
+            continue;
+        }
+        occlude(Some(entity), sharp, &|_| true, &results, out);
+        out.extend((0..channels).map(|channel| {
+            let last = channel + 1 == channels;
+            ListEntry::Shine { entity, channel: light.coloured.then_some(channel), last }.pack()
+        }));
+        if sharp {
+            sharp_count = out.len() - first;
         }
     }
     if let Some(sky) = scope.scene().sky {
         chain(None, false, sky, &mut results);
         let Some((volume, is_within)) = scope.volume() else {
-            occlude(None, false, &|_| true, &results, out, &mut tell);
+            occlude(None, false, &|_| true, &results, out);
             return sharp_count;
         };
         let has = |j: u32| volume.has[j as usize];
         let of_volume = candidates.occluders.iter().zip(&mut results).filter(|(j, _)| is_within && has(**j));
-        of_volume.for_each(|(_, result)| *result = CullResult::Own);
-        occlude(None, false, &has, &results, out, &mut tell);
+        of_volume.for_each(|(_, result)| *result = CullResult::LeftOff);
+        occlude(None, false, &has, &results, out);
         out.push(ListEntry::Volume { receiver: scope.index() as u32 }.pack());
-        occlude(None, false, &|j| !has(j), &results, out, &mut tell);
+        occlude(None, false, &|j| !has(j), &results, out);
     }
     sharp_count
 }

@@ -10,7 +10,7 @@
 
 use crate::layout::{self, ListEntry, OWN_MAPS};
 use crate::lists::far::{Cut, FarRuns};
-use crate::lists::gather::{self, Candidates, ClusterBounds, Counts, GROUP_CLUSTERS, SceneBounds};
+use crate::lists::gather::{self, Candidates, ClusterBounds, GROUP_CLUSTERS, SceneBounds};
 use crate::lists::scope::Scope;
 use crate::lists::sight::{Sight, TriangleRun};
 use crate::scene::Placement;
@@ -191,11 +191,6 @@ impl ClusterLists {
     /// Clusters that have changed since they were merged.
     pub fn stale_count(&self) -> usize {
         self.stale.iter().filter(|stale| **stale).count()
-    }
-
-    /// Clusters that none of the sights of their receivers sees.
-    pub fn hidden_count(&self, sights: &[Vec<Sight>]) -> usize {
-        (0..self.clusters.len()).filter(|&cluster| !self.is_seen(cluster, sights)).count()
     }
 
     fn is_seen(&self, cluster: usize, sights: &[Vec<Sight>]) -> bool {
@@ -382,16 +377,6 @@ impl ClusterLists {
             *count |= if differs { OWN_MAPS } else { 0 };
         }
         (places, all)
-    }
-
-    /// What all lists of a time leave off, and why.
-    pub fn counts(&self, state: &State) -> Counts {
-        let of_group = |group: &WatchedGroup| {
-            let receiver = group.receiver;
-            let of_cluster = |cluster| gather::counts(&self.scope(state, receiver, cluster), receiver as u32);
-            group.clusters.clone().map(of_cluster).fold(Counts::default(), Counts::plus)
-        };
-        self.groups.par_iter().map(of_group).reduce(Counts::default, Counts::plus)
     }
 
     /// Entities on the lists of a receiver's clusters at a time.

@@ -1,5 +1,4 @@
-//! Bounds of clusters, entities and lights at one time, from which cluster lists are made, and counts of what lists
-//! leave off.
+//! Bounds of clusters, entities and lights at one time, from which cluster lists are made.
 
 use crate::field::sheet::Sheet;
 use crate::field::silhouette::SilhouetteField;
@@ -8,7 +7,6 @@ use crate::lists::skip::Skip;
 use crate::lists::tree::Tree;
 use crate::scene::groups::Groups;
 use glam::{DQuat, DVec3, Vec3};
-use serde::Serialize;
 use std::f64::consts::PI;
 use std::sync::Arc;
 
@@ -195,68 +193,4 @@ impl SceneBounds {
 pub fn distance_key(a: [f32; 3], b: [f32; 3]) -> u32 {
     let [x, y, z] = [a[0] - b[0], a[1] - b[1], a[2] - b[2]];
     (x * x + y * y + z * z).to_bits()
-}
-
-/// What was considered and left off, in (cluster, chain, entity) triples unless said otherwise, and a bound of the
-/// light in what was left off.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
-pub struct Counts {
-    /// Lookups that a merge without lists would make.
-    pub considered: u64,
-    /// Occluders that lie behind the light for the whole cluster.
-    pub behind_light: u64,
-    /// Lights and occluders below the horizon of the whole cluster.
-    pub below_horizon: u64,
-    /// Occluders whose cones do not meet the light's anywhere in the cluster.
-    pub apart: u64,
-    /// Lights whose field is zero on the side of the cluster, and occluders in front of them.
-    pub facing_away: u64,
-    /// Lights and occluders bounded below eps.
-    pub below_eps: u64,
-    /// Occluders that every ray from the cluster to a sharp light passes by.
-    pub passed_by: u64,
-    /// Sharp lights of which one occluder covers all from the cluster, and occluders before them.
-    pub covered: u64,
-    /// Occluders of the receiver's own group, whose shadows its own visibility has, and those of a visibility volume.
-    pub own: u64,
-    /// Occluders that stand on the list as a cap alone.
-    pub caps: u64,
-    /// Entities that cast shadows or shine by a field of nothing but zeros, and are left off everywhere.
-    pub empty: u64,
-    /// Entities that cast shadows or shine where nothing but themselves is lit: their fields are not even baked.
-    pub unseen: u64,
-    /// Clusters that the camera does not see.
-    pub hidden: u64,
-    /// Triangles that are not drawn since the camera does not see them.
-    pub undrawn: u64,
-    /// Bound of the radiosity that was left off as below eps, of the cluster where it is largest.
-    pub dropped_bound: f64,
-}
-
-impl Counts {
-    /// Lookups that are left off.
-    pub fn skipped(&self) -> u64 {
-        let lights = self.behind_light + self.facing_away + self.passed_by + self.covered;
-        lights + self.below_horizon + self.apart + self.own + self.below_eps
-    }
-
-    /// The sums, and the larger bound.
-    pub(crate) fn plus(mut self, other: Self) -> Self {
-        self.considered += other.considered;
-        self.behind_light += other.behind_light;
-        self.below_horizon += other.below_horizon;
-        self.apart += other.apart;
-        self.facing_away += other.facing_away;
-        self.below_eps += other.below_eps;
-        self.passed_by += other.passed_by;
-        self.covered += other.covered;
-        self.own += other.own;
-        self.caps += other.caps;
-        self.empty += other.empty;
-        self.unseen += other.unseen;
-        self.hidden += other.hidden;
-        self.undrawn += other.undrawn;
-        self.dropped_bound = self.dropped_bound.max(other.dropped_bound);
-        self
-    }
 }

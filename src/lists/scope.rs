@@ -24,28 +24,13 @@ const VOLUME_MARGIN_M: f64 = 1e-4;
 /// Share of a vertex's view, times its albedo, below which the light that an entity reflects is left out.
 const LEAST_TAKEN: f64 = 1.0 / 96.0;
 
-/// What becomes of an entity in a chain.
+/// What becomes of an occluder in a chain.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum CullResult {
     Listed,
-    /// It stands there as a cap alone.
-    Cap,
-    /// No vertex sees it above its horizon.
-    BelowHorizon,
-    /// It is of the receiver's group, whose shadows the receiver's own visibility has; or the visibility volume has them.
-    Own,
-    /// It is farther than the light from every vertex.
-    BehindLight,
-    /// Its cone meets the light's from no vertex.
-    Apart,
-    /// Every ray from the cluster to the sharp light passes it by.
-    PassedBy,
-    /// It blocks every ray from the cluster to the sharp light, or is such a light.
-    Covered,
-    /// No vertex is on the side to which it shines.
-    FacingAway,
-    /// The radiosity that goes with it is bounded by this, which is below eps.
-    BelowEps(f64),
+    LeftOff,
+    /// It blocks every ray from the cluster to the sharp light, which is left off with its chain.
+    Covers,
 }
 
 /// An angle from 0 to pi as its cosine and sine. Sums beyond pi stay there.
@@ -285,76 +270,71 @@ impl<'m> Scope<'m> {
         SheetSides { normal, height: normal.dot(self.centre - sheet.centre), known: known[0] || known[1] }
     }
 
-    pub fn light_result(&self, light: &ListLight, view: &SphereView) -> CullResult {
+    /// Whether a light may reach a vertex: it stands above the horizon, shines to this side, and brings enough.
+    pub fn may_light(&self, light: &ListLight, view: &SphereView) -> bool {
         if view.below {
-            return CullResult::BelowHorizon;
+            return false;
         }
         let [x, y, z, cosine] = light.facing.map(f64::from);
         if cosine >= -1.0 && view.nearest > 0.0 {
             let away = -view.toward.dot(DVec3::new(x, y, z));
             if away < Angle::of_cosine(cosine).plus(view.turn).cosine {
-                return CullResult::FacingAway;
+                return false;
             }
         }
-        self.of_weight(f64::from(light.radiance) * view.weight)
+        self.is_enough(f64::from(light.radiance) * view.weight)
     }
 
-    fn of_weight(&self, radiance: f64) -> CullResult {
-        let reflected = self.reflectance * radiance;
-        if reflected < self.scene.eps.into() { CullResult::BelowEps(reflected) } else { CullResult::Listed }
+    /// Whether the radiosity that goes with an irradiance is not bounded below eps.
+    fn is_enough(&self, radiance: f64) -> bool {
+        self.reflectance * radiance >= self.scene.eps.into()
     }
 
-    /// What becomes of an occluder in the chain of a light (`None`: of the sky). It takes at most what comes from its
-    /// part of the view, and at most what the light brings.
+    /// Whether an occluder may take light in the chain of a light (`None`: of the sky). It takes at most what comes from
+    /// its part of the view, and at most what the light brings.
     ///
     /// Before a sharp light an occluder counts where any part of it may be nearer than any part of the light's middle
     /// plane, and where their cones meet, without the fade that bands need.
-    pub fn occluder_result(
-        &self,
-        view: &SphereView,
-        light: Option<&SphereView>,
-        sharp: bool,
-        radiance: f32,
-    ) -> CullResult {
+    pub fn may_block(&self, view: &SphereView, light: Option<&SphereView>, sharp: bool, radiance: f32) -> bool {
         let radiance = f64::from(radiance);
         if view.below {
-            return CullResult::BelowHorizon;
+            return false;
         }
-        let Some(light) = light else { return self.of_weight(radiance * view.weight) };
+        let Some(light) = light else { return self.is_enough(radiance * view.weight) };
         if let Some(sides) = &view.sheet {
-            return self.sheet_result(sides, view, light, sharp, radiance);
+            return self.sheet_may_block(sides, view, light, sharp, radiance);
         }
         let reach = if sharp { view.radius } else { 0.0 };
         if self.scene.skip.behind && view.nearest - reach > light.farthest {
-            return CullResult::BehindLight;
+            return false;
         }
         let fade = if sharp { 0.0 } else { SKIP_FADE_RAD };
         if self.scene.skip.cones && apart(view, light, fade) {
-            return CullResult::Apart;
+            return false;
         }
-        self.of_weight(radiance * view.weight.min(light.weight))
+        self.is_enough(radiance * view.weight.min(light.weight))
     }
 
-    /// As [`Scope::occluder_result`], of a sheet that rises above the horizon. A sheet blocks what lies beyond its
+    /// As [`Scope::may_block`], of a sheet that rises above the horizon. A sheet blocks what lies beyond its
     /// plane: in bands a light whose centre does, and of a sharp light the parts that do.
-    fn sheet_result(
+    fn sheet_may_block(
         &self,
         sides: &SheetSides,
         view: &SphereView,
         light: &SphereView,
         sharp: bool,
         radiance: f64,
-    ) -> CullResult {
+    ) -> bool {
         let light_height = sides.height + sides.normal.dot(light.toward) * (light.nearest + self.radius_m);
         let reaches = if sharp { light.radius } else { 0.0 };
         if self.scene.skip.behind && sides.known && light_height + reaches < 0.0 {
-            return CullResult::BehindLight;
+            return false;
         }
         // The shares of the four sides of a sheet that is seen at a grazing angle end less than that far from it.
         if sharp && self.scene.skip.cones && apart(view, light, SKIP_FADE_RAD) {
-            return CullResult::Apart;
+            return false;
         }
-        self.of_weight(radiance * view.weight.min(light.weight))
+        self.is_enough(radiance * view.weight.min(light.weight))
     }
 
     /// What becomes of an occluder whose cone meets that of a sharp light (centre in the world, radius). All rays from
@@ -385,8 +365,8 @@ impl<'m> Scope<'m> {
         let between = along - INSIDE[1] * radius_m - self.radius_m > 0.0
             && distance - along - INSIDE[1] * radius_m - f64::from(light_radius) > 0.0;
         match found {
-            found if skip.passed && found < -clear => CullResult::PassedBy,
-            found if skip.covered && outline.opaque && between && found > clear => CullResult::Covered,
+            found if skip.passed && found < -clear => CullResult::LeftOff,
+            found if skip.covered && outline.opaque && between && found > clear => CullResult::Covers,
             _ => CullResult::Listed,
         }
     }
@@ -394,7 +374,7 @@ impl<'m> Scope<'m> {
     /// Whether no member of a crowd matters to any cluster within the bounds: their weight under the brightest light is
     /// negligible.
     pub fn leaves_out(&self, crowd: &Crowd) -> bool {
-        self.of_weight(self.crowd_weight(crowd) * f64::from(self.scene.brightest)) != CullResult::Listed
+        !self.is_enough(self.crowd_weight(crowd) * f64::from(self.scene.brightest))
     }
 
     /// The same for light that its members reflect: each takes less of the view than counts.
@@ -439,16 +419,13 @@ impl<'m> Scope<'m> {
         let scene = self.scene;
         let view = scene.entities[index].occludes.then(|| self.view_of(index));
         let blocks = |light: Option<&SphereView>, sharp, radiance: f32| {
-            !self.is_own(index, sharp)
-                && view
-                    .as_ref()
-                    .is_some_and(|view| self.occluder_result(view, light, sharp, radiance) == CullResult::Listed)
+            !self.is_own(index, sharp) && view.as_ref().is_some_and(|view| self.may_block(view, light, sharp, radiance))
         };
         let mut lights = scene.lights.iter().filter(|light| light.entity != receiver);
         scene.sky.is_some_and(|sky| blocks(None, false, sky))
             || lights.any(|light| {
                 let light_view = self.view(scene.spheres[light.entity as usize]);
-                self.light_result(light, &light_view) == CullResult::Listed
+                self.may_light(light, &light_view)
                     && (light.entity as usize == index || blocks(Some(&light_view), light.sharp, light.radiance))
             })
     }

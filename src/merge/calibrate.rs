@@ -3,7 +3,6 @@
 
 use crate::error::{Error, Result};
 use crate::gpu::Device;
-use crate::merge::Merge;
 use crate::merge::variant::{VARIANTS, Variant};
 use crate::merge::workload::Workload;
 use crate::shaders::Library;
@@ -27,7 +26,7 @@ const VERTICES: u32 = 16_384;
 /// Occluders that each vertex meets.
 const OCCLUDERS: u32 = 8;
 /// Timed runs of each variant, interleaved; the least counts, since noise only adds.
-const RUNS: usize = 5;
+const RUNS: u32 = 5;
 
 fn path(device: &Device) -> Option<PathBuf> {
     Some(device.cache_dir.as_ref()?.join(format!("calibration-{}.json", device.info.uuid)))
@@ -68,35 +67,18 @@ pub fn learn(device: &Arc<Device>, library: &Library) -> Result<Option<Calibrati
 /// refuses to compile takes no part.
 pub fn measure(device: &Arc<Device>, library: &Library) -> Result<Calibration> {
     let workload = Workload::new(device, VERTICES, OCCLUDERS)?;
-    let mut contenders = Vec::new();
-    for &variant in VARIANTS {
-        let merge = match Merge::new(device, library, workload.permutation(variant)) {
-            Err(error @ (Error::Failed(_) | Error::Shader(_))) => {
-                log::warn!("calibration: {} takes no part: {error}", variant.name);
-                None
-            }
-            other => Some(other?),
-        };
-        contenders.push((variant.name, merge, workload.inputs(variant)?, f64::INFINITY));
-    }
-    for run in 0..=RUNS {
-        for (_, merge, inputs, least) in &mut contenders {
-            let Some(merge) = merge else { continue };
-            let milliseconds = workload.run(merge, inputs)?;
-            // The first run compiles.
-            if run > 0 {
-                *least = least.min(milliseconds);
-            }
-        }
-    }
-    let best = contenders.iter().filter(|c| c.1.is_some()).min_by(|a, b| a.3.total_cmp(&b.3));
-    let (fastest, ..) = best.ok_or_else(|| Error::Failed("the driver compiles no variant of the merge".into()))?;
-    let milliseconds =
-        |(name, merge, _, least): &(&str, Option<Merge>, _, f64)| ((*name).to_owned(), merge.as_ref().map(|_| *least));
+    let times = workload.time(library, VARIANTS, RUNS)?;
+    let least = times.iter().map(|times| Some(times.as_ref()?.iter().copied().fold(f64::INFINITY, f64::min)));
+    let milliseconds: Vec<(String, Option<f64>)> =
+        VARIANTS.iter().map(|variant| variant.name.to_owned()).zip(least).collect();
+    let timed = milliseconds.iter().filter_map(|(name, ms)| Some((name, (*ms)?)));
+    let (fastest, _) = timed
+        .min_by(|a, b| a.1.total_cmp(&b.1))
+        .ok_or_else(|| Error::Failed("the driver compiles no variant of the merge".into()))?;
     Ok(Calibration {
         driver: device.info.driver.clone(),
         program: env!("CARGO_PKG_VERSION").into(),
-        fastest: (*fastest).into(),
-        milliseconds: contenders.iter().map(milliseconds).collect(),
+        fastest: fastest.clone(),
+        milliseconds,
     })
 }

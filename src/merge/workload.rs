@@ -1,7 +1,7 @@
 //! A made-up merge of known size, for timing: a floor of vertices under turned occluders and a sky, every vertex
 //! meeting every occluder, fields of one shape filled with a constant.
 
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::field::Lattice;
 use crate::field::quantity::{Storage, channel_stride};
 use crate::gpu::{Buffer, BufferKind, Commands, Device};
@@ -10,6 +10,7 @@ use crate::lists::skip::Skip;
 use crate::merge::variant::{MergePermutation, Variant, uniform_entities};
 use crate::merge::{Merge, MergeInputs, Readable};
 use crate::sh::rotation::turns;
+use crate::shaders::Library;
 use ash::vk;
 use glam::{DQuat, DVec3};
 use std::sync::Arc;
@@ -134,7 +135,7 @@ impl Workload {
         }
     }
 
-    pub fn inputs(&self, variant: Variant) -> Result<MergeInputs<'_>> {
+    fn inputs(&self, variant: Variant) -> Result<MergeInputs<'_>> {
         let floats = vk::Format::R32G32B32A32_SFLOAT;
         Ok(MergeInputs {
             through: None,
@@ -148,12 +149,32 @@ impl Workload {
         })
     }
 
-    /// Runs the merge once and returns its milliseconds.
-    pub fn run(&self, merge: &Merge, inputs: &MergeInputs<'_>) -> Result<f64> {
+    /// Milliseconds of every variant's merges, in turns, after one of each that compiles; `None` of a variant that the
+    /// driver refuses to compile.
+    pub fn time(&self, library: &Library, variants: &[Variant], runs: u32) -> Result<Vec<Option<Vec<f64>>>> {
         let device = self.radiosity.device();
-        let mut commands = Commands::new(device, "workload")?;
-        let clusters = self.vertex_count / CLUSTER_VERTICES;
-        commands.pass("merge", |commands| merge.record(commands, inputs, &self.radiosity, clusters))?;
-        Ok(commands.submit()?[0].milliseconds)
+        let mut merges = Vec::new();
+        for &variant in variants {
+            let merge = match Merge::new(device, library, self.permutation(variant)) {
+                Err(error @ (Error::Failed(_) | Error::Shader(_))) => {
+                    log::warn!("{} is not timed: {error}", variant.name);
+                    None
+                }
+                other => Some((other?, self.inputs(variant)?, Vec::new())),
+            };
+            merges.push(merge);
+        }
+        for run in 0..=runs {
+            for (merge, inputs, times) in merges.iter_mut().flatten() {
+                let mut commands = Commands::new(device, "workload")?;
+                let clusters = self.vertex_count / CLUSTER_VERTICES;
+                commands.pass("merge", |commands| merge.record(commands, inputs, &self.radiosity, clusters))?;
+                let milliseconds = commands.submit()?[0].milliseconds;
+                if run > 0 {
+                    times.push(milliseconds);
+                }
+            }
+        }
+        Ok(merges.into_iter().map(|merge| merge.map(|(_, _, times)| times)).collect())
     }
 }

@@ -71,14 +71,7 @@ pub struct DeviceSurface {
     pub reach_m: f32,
 }
 
-impl DeviceMesh {
-    /// Whether the mesh has the field with which an entity shades or shines, and that field holds only zeros.
-    pub fn is_empty(&self, emits: bool) -> bool {
-        let source = if emits && self.radiance.is_some() { &self.radiance } else { &self.blocked };
-        source.as_ref().is_some_and(|slot| slot.extent == Extent::Nothing)
-    }
-}
-
+/// The data of a scene on the device.
 pub struct SceneBuffers {
     pub fields: Buffer,
     pub silhouettes: Silhouettes,

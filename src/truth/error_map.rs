@@ -12,8 +12,6 @@ use std::path::Path;
 #[derive(Clone, Debug, Serialize)]
 pub struct ErrorPicture {
     pub picture: String,
-    /// Where the rays of the reference begin.
-    pub truth: &'static str,
     /// Mapping from errors to colours.
     pub scale: ColorScale,
     /// Root mean square over all lit vertices, relative to that of the reference.
@@ -54,14 +52,6 @@ impl ErrorMap {
         (all().map(|e| e * e).sum::<f64>() / all().count().max(1) as f64).sqrt()
     }
 
-    /// Title of a picture of these errors.
-    pub fn title(&self, reference_error: f64) -> String {
-        format!(
-            "error of radiosity / RMS radiosity by rays from vertices; blue: too dark, red: too bright; RMS {:.4}, of the rays themselves {reference_error:.4}",
-            self.rms()
-        )
-    }
-
     /// The colour scale that fits these errors: see [`ColorScale::fitting`].
     pub fn scale(&self) -> ColorScale {
         ColorScale::fitting(Scheme::Signed, self.errors.iter().flat_map(|(_, errors)| errors.iter().copied()))
@@ -72,22 +62,9 @@ impl ErrorMap {
         self.errors.iter().map(|(entity, errors)| (*entity, errors.iter().map(|e| scale.color(*e)).collect())).collect()
     }
 
-    /// Draws a frame in the errors' colours. Entities that are not lit are grey, and emission is not drawn. The frame's
-    /// radiosity is replaced until the next merge.
-    pub fn draw(&self, frame: &mut Frame, placements: &[Placement], scale: &ColorScale) -> Result<()> {
-        for entity in 0..frame.scene().entities.len() {
-            let count = frame.scene().surface(entity).positions.len();
-            frame.set_radiosity(entity, &vec![NEUTRAL; count])?;
-        }
-        for (entity, colors) in self.colors(scale) {
-            frame.set_radiosity(entity, &colors)?;
-        }
-        frame.redraw_unlit(placements, BACKGROUND)?;
-        Ok(())
-    }
-
-    /// Draws the errors and writes the picture with its scale bar. `limit` replaces the fitting limit of the scale; the
-    /// title states the reference's own standard error.
+    /// Draws the errors and writes the picture with its scale bar. Entities that are not lit are grey, and emission is not
+    /// drawn. `limit` replaces the fitting limit of the scale; the title states the reference's own standard error. The
+    /// frame's radiosity is replaced until the next merge.
     pub fn write(
         &self,
         path: &Path,
@@ -98,12 +75,24 @@ impl ErrorMap {
     ) -> Result<ErrorPicture> {
         let fitting = self.scale();
         let scale = ColorScale { limit: limit.unwrap_or(fitting.limit), ..fitting };
-        self.draw(frame, placements, &scale)?;
+        for entity in 0..frame.scene().entities.len() {
+            let count = frame.scene().surface(entity).positions.len();
+            frame.set_radiosity(entity, &vec![NEUTRAL; count])?;
+        }
+        for (entity, colors) in self.colors(&scale) {
+            frame.set_radiosity(entity, &colors)?;
+        }
+        frame.redraw_unlit(placements, BACKGROUND)?;
+        let title = format!(
+            "error of radiosity / RMS radiosity by rays from vertices; blue: too dark, red: too bright; RMS {:.4}, of the rays \
+             themselves {reference_error:.4}",
+            self.rms()
+        );
         let [width, _] = frame.size();
-        let (drawn, rows) = scale.with_bar(&frame.picture(), width as usize, &self.title(reference_error));
+        let (drawn, rows) = scale.with_bar(&frame.picture(), width as usize, &title);
         picture::write_png(path, width, rows as u32, &drawn, 0.0)?;
         let picture = path.display().to_string();
-        Ok(ErrorPicture { picture, truth: "vertices", scale, rms: self.rms(), reference_error })
+        Ok(ErrorPicture { picture, scale, rms: self.rms(), reference_error })
     }
 }
 

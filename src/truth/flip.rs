@@ -193,9 +193,3 @@ pub fn flip(width: usize, a: &[f32], b: &[f32]) -> Vec<f64> {
     };
     (0..a.lab.len()).into_par_iter().map(|i| color(i).powf(1.0 - feature(i)).min(1.0)).collect()
 }
-
-/// Mean FLIP of two pictures, as [`flip`]; 0 of pictures without pixels.
-pub fn mean_flip(width: usize, a: &[f32], b: &[f32]) -> f64 {
-    let map = flip(width, a, b);
-    map.iter().sum::<f64>() / map.len().max(1) as f64
-}

@@ -68,6 +68,14 @@ pub fn sample_vertices(scene: &Scene, count: usize, seed: u64) -> Vec<Vertex> {
 /// An entity and the radiosity of its vertices.
 pub type EntityRadiosity = (usize, Vec<[f32; 3]>);
 
+/// Radiosity by entity, of vertices that are sorted.
+pub fn by_entity(vertices: &[Vertex], lit: &[Estimate]) -> Vec<EntityRadiosity> {
+    let lit: Vec<_> = vertices.iter().zip(lit).collect();
+    let entities = lit.chunk_by(|(a, _), (b, _)| a.entity == b.entity);
+    let radiosity = |(_, estimate): &(&Vertex, &Estimate)| estimate.radiosity.map(|c| c as f32);
+    entities.map(|run| (run[0].0.entity, run.iter().map(radiosity).collect())).collect()
+}
+
 /// T0 of a whole scene, for pictures: radiosity of every receiver's vertices by entity, as `Frame::set_radiosity` takes
 /// it, and the root mean square of its standard error relative to that of the radiosity.
 pub fn picture(scene: &Scene, placements: &[Placement], cast: &RayCast) -> (Vec<EntityRadiosity>, f64) {
@@ -75,12 +83,5 @@ pub fn picture(scene: &Scene, placements: &[Placement], cast: &RayCast) -> (Vec<
     let world = World::new(scene, &shapes, placements);
     let vertices = receiver_vertices(scene);
     let lit = cast.run(&world, &vertices);
-    let mut out: Vec<EntityRadiosity> = Vec::new();
-    for (vertex, estimate) in vertices.iter().zip(&lit) {
-        if out.last().is_none_or(|(entity, _)| *entity != vertex.entity) {
-            out.push((vertex.entity, Vec::new()));
-        }
-        out.last_mut().expect("just pushed").1.push(estimate.radiosity.map(|c| c as f32));
-    }
-    (out, raycast::relative_error(&lit))
+    (by_entity(&vertices, &lit), raycast::relative_error(&lit))
 }

@@ -1,11 +1,11 @@
 //! T0 at pixels: what pixels show of the scene, lit by rays from there.
 
+use super::Vertex;
 use super::raycast::{Estimate, RayCast};
 use super::reflect::Reflection;
 use super::world::{EntityView, SurfaceHit, VertexView, World};
-use super::{RayMeshes, Vertex};
 use crate::draw::camera::through_pixels;
-use crate::scene::{Gloss, Placement, Scene};
+use crate::scene::Gloss;
 use glam::DVec3;
 use rayon::prelude::*;
 
@@ -97,16 +97,6 @@ pub fn lit_points(world: &World<'_>, [width, height]: [u32; 2]) -> Vec<(Vertex, 
         (entity_data.receives && !entity_data.emits).then_some((Vertex { entity, index: pixel as usize }, view))
     };
     (0..width * height).into_par_iter().filter_map(surface).collect()
-}
-
-/// The pixels of [`lit_points`], and the linear RGB radiance that leaves what they show. `cast` decides the rays a
-/// pixel.
-pub fn pixels(scene: &Scene, placements: &[Placement], size: [u32; 2], cast: &RayCast) -> Vec<(usize, Estimate)> {
-    let shapes = RayMeshes::new(scene);
-    let world = World::new(scene, &shapes, placements);
-    let points = lit_points(&world, size);
-    let lit = cast.run_at(&world, &points);
-    points.iter().zip(lit).map(|((key, _), estimate)| (key.index, estimate)).collect()
 }
 
 /// A picture by rays: linear RGB, three floats a pixel, rows from the top.

@@ -9,7 +9,7 @@ use crate::asset::false_color::NEUTRAL;
 use crate::error::Result;
 use crate::scene::{Placement, Scene};
 use crate::truth::error_map::{self, ErrorMap};
-use crate::truth::{EntityRadiosity, RayCast, RayMeshes, World, raycast, receiver_vertices};
+use crate::truth::{EntityRadiosity, RayCast, RayMeshes, World, by_entity, raycast, receiver_vertices};
 
 /// Rays per vertex and light in each round; a round does not reuse the previous one.
 const ROUNDS: [u32; 3] = [32, 256, 2048];
@@ -105,12 +105,6 @@ fn round(
         worker.report(&format!("{} rays a vertex", cast.rays), lit.len() as u32, vertices.len() as u32);
         lit.extend(cast.run(world, chunk));
     }
-    let mut radiosity: Vec<EntityRadiosity> = Vec::new();
-    for (vertex, estimate) in vertices.iter().zip(&lit) {
-        if radiosity.last().is_none_or(|(entity, _)| *entity != vertex.entity) {
-            radiosity.push((vertex.entity, Vec::new()));
-        }
-        radiosity.last_mut().expect("just pushed").1.push(estimate.radiosity.map(|c| c as f32));
-    }
+    let radiosity = by_entity(&vertices, &lit);
     Ok(Reference { version, rays: cast.rays, error: raycast::relative_error(&lit), radiosity })
 }

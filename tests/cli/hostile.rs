@@ -2,12 +2,11 @@
 //! and ends with the exit code that the reason has.
 #![cfg(unix)]
 
-use crate::cli::{COARSE, Folder, bare, finish, limited, names, without_drivers};
+use crate::cli::{COARSE, Folder, finish, limited, without_drivers};
 use crate::common;
 use shadow_fields::error::is_deceptive;
 use std::ffi::OsStr;
 use std::os::unix::ffi::OsStrExt;
-use std::os::unix::fs::symlink;
 use std::process::Command;
 
 const TRIANGLE: &str = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n";
@@ -91,17 +90,6 @@ fn control_characters_do_not_reach_the_terminal() {
 }
 
 #[test]
-fn links_in_a_circle_are_no_output() {
-    let Some(folder) = with_device() else { return };
-    symlink("two.sf", folder.at("one.sf")).unwrap();
-    symlink("one.sf", folder.at("two.sf")).unwrap();
-    let ran = folder.run(&format!("{BAKE} -o one.sf"));
-    assert_eq!(ran.code, 1, "{}", ran.stderr);
-    assert!(folder.at("one.sf").is_symlink());
-    assert_eq!(folder.names(), ["m.obj", "one.sf", "two.sf"]);
-}
-
-#[test]
 #[cfg(target_os = "linux")]
 fn full_devices_are_told_alike() {
     let Some(folder) = with_device() else { return };
@@ -117,17 +105,6 @@ fn full_devices_are_told_alike() {
     assert!(text.lines().count() == 1 && text.starts_with("shadow-fields: stdout: "), "{text}");
     let ran = folder.run(&format!("{RENDER} -o /proc/x.png"));
     assert!(ran.code == 1 && !ran.stderr.contains("unfinished"), "{}", ran.stderr);
-}
-
-/// A write beyond the limit on file sizes raises a signal that would end the program without a word.
-#[test]
-fn a_limit_on_file_sizes_is_an_error() {
-    let Some(folder) = with_device() else { return };
-    let bake = folder.command(&format!("{BAKE} -o f.sf --no-cache"));
-    let ran = finish(&mut limited(&bake, "ulimit -f 2"));
-    assert_eq!(ran.code, 1, "{}", ran.stderr);
-    assert!(ran.stderr.contains("f.sf: cannot be written: File too large"), "{}", ran.stderr);
-    assert_eq!(folder.names(), ["m.obj"]);
 }
 
 /// What memory a picture takes is compared with what there is before anything is baked for it.
@@ -170,22 +147,6 @@ fn a_terminal_is_told_what_is_compiled() {
     for more in ["--quiet", "--no-progress"] {
         let (good, shown) = terminal(more).unwrap();
         assert!(good && !shown.contains("compiling"), "{shown}");
-    }
-}
-
-/// What killed runs left is gone after the next run, in the folder of results and in the cache.
-#[test]
-fn leftovers_of_killed_runs_are_swept() {
-    let Some(folder) = with_device() else { return };
-    let places = ["", "cache", "cache/fields", "cache/spirv"].map(|place| folder.at(place));
-    for place in &places {
-        std::fs::create_dir_all(place).unwrap();
-        std::fs::write(place.join(".unfinished-killed"), "half").unwrap();
-    }
-    let ran = finish(&mut bare(folder.path(), &format!("{BAKE} -o f.sf --cache-dir cache")));
-    assert_eq!(ran.code, 0, "{}", ran.stderr);
-    for place in &places {
-        assert!(!names(place).iter().any(|name| name.starts_with(".unfinished-")), "{}", place.display());
     }
 }
 

@@ -3,29 +3,18 @@
 use crate::cli::{Folder, finish, names};
 use crate::common::library;
 use serde_json::Value;
-use shadow_fields::gpu::census::Census;
+use shadow_fields::gpu::census;
 use shadow_fields::shaders::ShaderPermutation;
-
-fn ceiling(kind: u32) -> Census {
-    let row =
-        ShaderPermutation::new("ceiling.comp", 4).define("KIND", kind).define("READS", 16_u32).define("ROUNDS", 64_u32);
-    Census::new(&library().shader(&row.define("MASK", 1023_u32)).unwrap()).unwrap()
-}
 
 #[test]
 fn a_round_of_a_loop_is_counted() {
-    let arithmetic = ceiling(0);
-    assert_eq!(arithmetic.flops, 16 * 4 * 2, "sixteen vectors of four, multiplied and added");
-    assert!(arithmetic.fetches.is_empty() && arithmetic.block_bytes == 0);
-    for kind in [1, 2] {
-        let census = ceiling(kind);
-        assert_eq!(census.fetches.get("source"), Some(&16));
-        assert_eq!(census.fetch_count(), 16);
-        assert_eq!(census.flops, 16 * 4, "each is added");
-    }
-    let census = ceiling(3);
-    assert_eq!(census.fetch_count(), 0);
-    assert_eq!(census.block_bytes, 16 * 8);
+    let flops = |kind: u32| {
+        let row = ShaderPermutation::new("ceiling.comp", 4).define("KIND", kind).define("READS", 16_u32);
+        let row = row.define("ROUNDS", 64_u32).define("MASK", 1023_u32);
+        census::flops(&library().shader(&row).unwrap()).unwrap()
+    };
+    assert_eq!(flops(0), 16 * 4 * 2, "sixteen vectors of four, multiplied and added");
+    assert_eq!(flops(1), 16 * 4, "sixteen texels, each added");
 }
 
 fn profile(folder: &Folder, line: &str) -> Value {
@@ -52,13 +41,9 @@ fn two_variants_side_by_side() {
     assert_eq!(rows.len(), 2);
     for (row, name) in rows.iter().zip(["texel-packed", "storage"]) {
         assert_eq!(row["variant"], name);
-        positive(row, &["/ms/median", "/ns_a_pair", "/gflops", "/gb_s", "/arithmetic_share", "/read_share"]);
-        // Four corners of four quads.
-        assert!(row["work"]["bytes"].as_u64().unwrap() >= 4 * 4 * 8, "{row}");
-        positive(row, &["/work/flops"]);
-        assert_eq!(row["work"]["fetches"].as_u64().unwrap() > 0, name == "texel-packed");
+        positive(row, &["/ms/median", "/ns_a_pair", "/flops", "/gflops", "/arithmetic_share"]);
     }
-    assert_eq!(names(&folder.at("out")), ["profile.csv", "profile.json"]);
+    assert_eq!(names(&folder.at("out")), ["profile.json"]);
 }
 
 /// A floor under a uniform sky.
@@ -120,11 +105,4 @@ fn a_device_never_seen_gets_a_default_at_once() {
         assert_eq!(variant(), default, "{key}: the device is as one never seen");
         assert_ne!(known().1[key], value, "{key}: and measured again");
     }
-}
-
-#[test]
-fn an_unknown_variant_lists_the_known() {
-    let Some(folder) = Folder::with_device() else { return };
-    let ran = folder.run("profile --variant fast");
-    assert!(ran.code == 2 && ran.stderr.contains("texel-shifted"), "{} {}", ran.code, ran.stderr);
 }

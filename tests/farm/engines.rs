@@ -19,12 +19,12 @@ fn engine(name: &str, is_there: bool) -> bool {
 }
 
 /// The path of programs, with those of the virtual environment that `scripts/setup test` makes first.
-pub fn search_path() -> String {
+fn search_path() -> String {
     let own = Path::new(env!("CARGO_MANIFEST_DIR")).join(".build/farm/bin");
     format!("{}:{}:/usr/sbin", own.display(), std::env::var("PATH").unwrap())
 }
 
-pub fn has_dask() -> bool {
+fn has_dask() -> bool {
     engine("Dask", succeeds("python3", &["-c", "import distributed"]))
 }
 
@@ -46,31 +46,15 @@ fn dask_runs_slices_in_two_workers() {
     assert!(farm.collected() == whole().files);
 }
 
-/// A package that is missing and a scheduler that does not answer end in one line.
+/// A package that is missing ends in one line.
 #[test]
-fn a_dask_that_cannot_run_says_so_in_a_line() {
+fn a_dask_that_is_missing_says_so_in_a_line() {
     let Some(farm) = Farm::planned() else { return };
     std::fs::create_dir(farm.path("stub")).unwrap();
     std::fs::write(farm.path("stub/distributed.py"), "raise ImportError").unwrap();
     let mut submit = farm.command(&["farm", "submit", "p.json", "--engine", "dask"]);
     let ran = finish(submit.env("PYTHONPATH", farm.path("stub")));
     assert_eq!((ran.code, ran.stderr.as_str()), (1, "shadow-fields: dask: python3 has no package distributed\n"));
-    if !has_dask() {
-        return;
-    }
-    let mut other = farm.read("p.json");
-    other["device"] = "another (driver)".into();
-    std::fs::write(farm.path("other.json"), other.to_string()).unwrap();
-    let mut submit = farm.command(&["farm", "submit", "other.json", "--engine", "dask", "--workers", "2"]);
-    let ran = finish(submit.env("PATH", search_path()));
-    let said = "shadow-fields: dask: 6 of 6 slices failed; slice ";
-    assert!(ran.code == 1 && ran.stderr.lines().count() == 1 && ran.stderr.starts_with(said), "{}", ran.stderr);
-    let started = std::time::Instant::now();
-    let dead = "tcp://127.0.0.1:9";
-    let mut submit = farm.command(&["farm", "submit", "p.json", "--engine", "dask", "--scheduler", dead]);
-    let ran = finish(submit.env("PATH", search_path()));
-    assert!(ran.code == 1 && ran.stderr.lines().count() == 1 && ran.stderr.contains(dead), "{}", ran.stderr);
-    assert!(started.elapsed().as_secs() < 30, "{:?}", started.elapsed());
 }
 
 /// No path of a plan, whoever wrote it, becomes a line of a script.

@@ -1,8 +1,7 @@
 //! What goes wrong on machines: kills, damage, folders that cannot be written. Nothing is lost then, and nothing is
 //! wrong.
 
-use super::engines::{has_dask, search_path};
-use super::{Farm, MESHES, common, finish, processes, whole};
+use super::{Farm, MESHES, cli, common, finish, processes, whole};
 use serde_json::{Value, json};
 use shadow_fields::farm::{Plan, results};
 use std::process::Command;
@@ -41,71 +40,19 @@ fn damaged_results_and_slices_that_run_twice_at_once_end_well() {
     assert!(farm.collected() == whole().files);
 }
 
-/// A full disk, a read-only folder and a limit on the sizes of files: the slice fails with one line, and leaves nothing
-/// half-written.
+/// A cache that cannot be written is no error of a bake, but here it is the result: the slice fails with one line, and
+/// leaves nothing half-written.
 #[test]
-fn folders_that_cannot_be_written_lose_nothing() {
+fn a_slice_that_cannot_be_written_fails() {
     let Some(farm) = Farm::planned() else { return };
-    std::fs::create_dir(farm.path("results")).unwrap();
-    for (words, how) in [
-        (&["unshare", "-m", "sh"][..], "mount -t tmpfs -o size=8k none results"),
-        (&["unshare", "-m", "sh"], "mount -t tmpfs -o ro none results"),
-        (&["sh"], "ulimit -f 4"),
-    ] {
-        let inner = farm.command(&["farm", "run", "p.json", "--slice", "0", "-q"]);
-        let mut outer = Command::new(words[0]);
-        let after = "\"$@\"; code=$?; find results -type f; exit $code";
-        outer.current_dir(farm.folder.path()).args(&words[1..]).args([
-            "-c",
-            &format!("{how} || exit 99; {after}"),
-            "sh",
-        ]);
-        outer.arg(inner.get_program()).args(inner.get_args()).env_remove("RUST_LOG");
-        let ran = finish(&mut outer);
-        if ran.code == 99 {
-            common::report(&format!("not allowed here: {how}"));
-            continue;
-        }
-        assert_eq!((ran.code, ran.stdout.as_str()), (1, ""), "{how}: {}", ran.stderr);
-        // With the limit, the folder that the slice works in is the first that cannot be written.
-        assert!(
-            ["cannot be written", "were written"].iter().any(|words| ran.stderr.contains(words)),
-            "{how}: {}",
-            ran.stderr
-        );
-    }
+    let run = farm.command(&["farm", "run", "p.json", "--slice", "0", "-q"]);
+    let ran = finish(&mut cli::limited(&run, "ulimit -f 4"));
+    assert_eq!((ran.code, ran.stdout.as_str()), (1, ""), "{}", ran.stderr);
+    // The folder that the slice works in is the first that cannot be written.
+    assert!(["cannot be written", "were written"].iter().any(|words| ran.stderr.contains(words)), "{}", ran.stderr);
+    assert!(farm.results().is_empty());
     farm.good(&["farm", "submit", "p.json", "--engine", "local"]);
     assert!(farm.collected() == whole().files);
-}
-
-/// Slices end when what waits for them is killed, and leave no result.
-#[test]
-fn slices_end_with_a_killed_submitter() {
-    let Some(farm) = Farm::with_device() else { return };
-    farm.good(&["farm", "plan", "meshes/a.obj", "-o", "p.json", "--quality", "high"]);
-    let slice = [farm.path("p.json").as_os_str().as_encoded_bytes(), b"\0"].concat();
-    let wait = |seconds, what: &str, done: &dyn Fn() -> bool| {
-        let start = std::time::Instant::now();
-        while !done() {
-            assert!(start.elapsed().as_secs() < seconds, "{what}");
-            std::thread::sleep(std::time::Duration::from_millis(20));
-        }
-    };
-    for engine in ["local", "dask"] {
-        let is_there = engine == "local" || has_dask();
-        let mut submit = farm.command(&["farm", "submit", "p.json", "--engine", engine, "--workers", "1", "-q"]);
-        if !is_there {
-            continue;
-        }
-        let mut submit = submit.env("PATH", search_path()).spawn().unwrap();
-        wait(60, "a slice begins", &|| !processes(&slice).is_empty());
-        std::thread::sleep(std::time::Duration::from_millis(500));
-        submit.kill().unwrap();
-        submit.wait().unwrap();
-        let folder = farm.folder.path().as_os_str().as_encoded_bytes();
-        wait(10, "slices end", &|| processes(folder).is_empty());
-        assert_eq!(farm.results(), [] as [std::path::PathBuf; 0], "{engine}: it was ended, not waited for");
-    }
 }
 
 /// Process ids of all that descend from a process, and its own.

@@ -1,10 +1,15 @@
 //! FLIP against the authors' program (flip-evaluator 1.7, LDR, 0.7 m from a screen of 3840 pixels and 0.7 m) on made-up
 //! pictures, and the properties that its paper states.
 
-use shadow_fields::truth::flip::{flip, mean_flip};
+use shadow_fields::truth::flip::flip;
 
 const WIDTH: usize = 64;
 const HEIGHT: usize = 48;
+
+fn mean_flip(width: usize, a: &[f32], b: &[f32]) -> f64 {
+    let map = flip(width, a, b);
+    map.iter().sum::<f64>() / map.len() as f64
+}
 
 /// A picture in linear RGB from a function of column and row.
 fn picture(of: impl Fn(i32, i32) -> [f64; 3]) -> Vec<f32> {
@@ -75,7 +80,7 @@ fn flip_is_symmetric_bounded_and_zero_of_the_same() {
 fn what_a_screen_cannot_show_counts_as_its_limits() {
     let odd = |x: i32, _: i32| [[7.0, -3.0, 0.5], [f64::INFINITY, f64::NAN, 0.5]][(x % 2) as usize];
     assert_eq!(mean_flip(WIDTH, &picture(odd), &picture(|_, _| [1.0, 0.0, 0.5])), 0.0);
-    assert_eq!(mean_flip(5, &[], &[]), 0.0);
+    assert!(flip(5, &[], &[]).is_empty());
     // A picture smaller than the eye's blur.
     assert!(mean_flip(1, &[0.0; 3], &[1.0; 3]) > 0.9);
 }

@@ -167,7 +167,4 @@ fn nothing_is_lit_twice() {
     let mut full = stage.frame(&scene, frame::Options { size: [64, 48], skip: Skip::without("hidden"), ..small() });
     assert_eq!(stage.light(&mut frame, &placements), stage.light(&mut full, &placements));
     assert_eq!(frame.stale_count(), 0);
-    let counts = [&frame, &full].map(|frame| frame.counts(&placements));
-    assert!(counts[0].hidden > 0 && counts[0].undrawn > 1000, "{counts:?}");
-    assert_eq!([counts[1].hidden, counts[1].undrawn], [0; 2]);
 }

@@ -1,5 +1,4 @@
-//! `scripts/expect`: outputs of test runs against lists of expected failures. And the workflow of `docs/vulkan-ci.yml`, as far as
-//! files say.
+//! `scripts/expect`: outputs of test runs against lists of expected failures.
 
 use crate::root;
 use std::process::{Command, Stdio};
@@ -43,16 +42,8 @@ fn a_failure_passes_only_if_it_is_on_the_list() {
     );
     let (code, lines) = expect("draw::edges\ndraw::more::edges\n", LOG);
     assert_eq!((code, lines.last().unwrap().as_str()), (0, "expect: 5 tests, 2 expected failures, 0 others"));
-    for (list, passes) in [
-        ("draw::*edges", true),
-        ("*", true),
-        ("draw::*", true),
-        ("*::edges", true),
-        ("draw::e*", false),
-        ("edges", false),
-        ("draw::edge", false),
-        ("*edge", false),
-    ] {
+    for (list, passes) in [("draw::*edges", true), ("*", true), ("draw::e*", false), ("edges", false), ("*edge", false)]
+    {
         assert_eq!(expect(list, LOG).0 == 0, passes, "{list}");
     }
 }
@@ -87,17 +78,4 @@ fn tap_is_read_too() {
     let (code, lines) = expect("b*\n", "1..4\nok 1 - a\nnot ok 2 - b [x]\nnot ok 3 c\nok 4 - d # SKIP no device\n");
     assert_eq!((code, &lines[..2]), (1, &["expected: b [x]".to_owned(), "FAILED:   c".to_owned()][..]));
     assert_eq!(lines[2], "expect: 3 tests, 1 expected failures, 1 others");
-}
-
-#[test]
-fn the_workflow_calls_what_is_there() {
-    let workflow = std::fs::read_to_string(root().join("docs/vulkan-ci.yml")).unwrap();
-    for file in ["scripts/driver-set", "scripts/expect", "scripts/setup"] {
-        assert!(workflow.contains(&format!("{file} ")) && root().join(file).exists(), "{file}");
-    }
-    let drivers = std::fs::read_to_string(root().join("scripts/driver-set")).unwrap();
-    let matrix = workflow.split("driver: [").nth(1).unwrap().split(']').next().unwrap();
-    for driver in matrix.split(", ") {
-        assert!(drivers.contains(driver), "no driver {driver}");
-    }
 }

@@ -153,17 +153,6 @@ fn modules_use_only_what_stands_above_them() {
 }
 
 #[test]
-fn the_reader_of_paths_finds_what_is_there() {
-    let source = "use crate::gpu::{Buffer, Device};\nuse crate::{field::{Lattice, Lookup}, scene};\n\
-                  let x = crate::sh::basis; // crate::app\nmycrate::truth; \"http://frame\" // crate::frame";
-    let found = names_after(&code(source), "crate::");
-    assert_eq!(found.into_iter().collect::<Vec<_>>(), ["field", "gpu", "scene", "sh"]);
-    assert_eq!(module(Path::new("src/gpu/mod.rs")), ("gpu".into(), 1));
-    assert_eq!(module(Path::new("src/gpu/access.rs")), ("gpu".into(), 2));
-    assert_eq!(module(Path::new("src/layout.rs")), ("layout".into(), 1));
-}
-
-#[test]
 fn every_shader_file_is_embedded() {
     let on_disk: BTreeSet<String> = files("glsl", &["glsl", "comp", "vert", "frag"])
         .iter()

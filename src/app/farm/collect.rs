@@ -10,7 +10,6 @@ use clap::Args;
 use serde_json::json;
 use std::path::{Path, PathBuf};
 
-/// Arguments of `farm collect`.
 #[derive(Args)]
 pub struct Arguments {
     /// Plan that `farm plan` has written
@@ -20,7 +19,6 @@ pub struct Arguments {
     into: Option<PathBuf>,
 }
 
-/// Collects results.
 pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
     let plan = Plan::read(&arguments.plan)?;
     let cache_dir = arguments.into.clone().or_else(|| context::cache_dir(global));

@@ -12,7 +12,6 @@ use clap::{Args, Subcommand};
 use serde_json::json;
 use std::path::PathBuf;
 
-/// Arguments of `farm`.
 #[derive(Args)]
 pub struct Arguments {
     #[command(subcommand)]
@@ -36,7 +35,6 @@ enum Commands {
     Submit(submit::Arguments),
 }
 
-/// Runs one of the commands.
 pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
     // Results are named by all that decides them, and a plan says nothing of these two.
     if global.shader_dir.is_some() || global.seed != Global::SEED {

@@ -18,7 +18,6 @@ use serde_json::json;
 use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 
-/// Arguments of `farm plan`.
 #[derive(Args)]
 #[command(after_help = "Examples:\n  shadow-fields farm plan meshes/ -o plan.json --quality high\n  \
     shadow-fields farm plan film.toml --frames 240 --pictures out/f_####.png -o film.json --size 1280x720")]
@@ -49,7 +48,6 @@ pub struct Arguments {
     picture: PictureArguments,
 }
 
-/// Plans slices.
 pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
     let full = std::path::absolute(&arguments.output).map_err(|error| Error::input(&arguments.output, error))?;
     plain(&full)?;

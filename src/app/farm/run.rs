@@ -16,7 +16,6 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Instant;
 
-/// Arguments of `farm run`.
 #[derive(Args)]
 pub struct Arguments {
     /// Plan that `farm plan` has written
@@ -29,7 +28,6 @@ pub struct Arguments {
     until_stdin_ends: bool,
 }
 
-/// Does one slice.
 pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
     let plan = Plan::read(&arguments.plan)?;
     let number = arguments.slice;

@@ -26,7 +26,6 @@ enum Engine {
     Openjd,
 }
 
-/// Arguments of `farm submit`.
 #[derive(Args)]
 pub struct Arguments {
     /// Plan that `farm plan` has written
@@ -46,7 +45,6 @@ pub struct Arguments {
     dry_run: bool,
 }
 
-/// Hands slices to an engine.
 pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
     let plan = Plan::read(&arguments.plan)?;
     let path = std::path::absolute(&arguments.plan).map_err(|error| Error::input(&arguments.plan, error))?;

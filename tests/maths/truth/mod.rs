@@ -260,12 +260,15 @@ fn a_pixel_is_lit_where_its_middle_meets_the_floor() {
     let scene = scene(&format!("{light}{}", ball(0.3, [-1.0, 0.3, 0.5])));
     let size = [48, 32];
     let cast = RayCast { rays: 64, runs: 1, ..Default::default() };
-    let lit = shadow_fields::truth::pixels::pixels(&scene, &scene.at(0.0), size, &cast);
+    let shapes = RayMeshes::new(&scene);
+    let world = World::new(&scene, &shapes, &scene.at(0.0));
+    let points = pixels::lit_points(&world, size);
+    let lit = cast.run_at(&world, &points);
     let to_world = clip_from_world(&scene.data.camera, 1.5).inverse();
     let eye = scene.data.camera.eye.as_dvec3();
     let mut near_form = 0;
-    for (pixel, estimate) in &lit {
-        let at = [pixel % 48, pixel / 48].map(|i| i as f64 + 0.5);
+    for ((key, _), estimate) in points.iter().zip(&lit) {
+        let at = [key.index % 48, key.index / 48].map(|i| i as f64 + 0.5);
         let toward = to_world.project_point3(DVec3::new(at[0] / 24.0 - 1.0, at[1] / 16.0 - 1.0, 1.0)) - eye;
         let place = eye - toward * (eye.y / toward.y);
         let to = DVec3::new(0.3, 1.5, 0.4) - place;

@@ -1,17 +1,12 @@
-//! Wavefront OBJ: a checking reader around `tobj`, and a writer whose text reads back as the same bits.
+//! Wavefront OBJ.
 //!
 //! The reader accepts `v x y z [w | r g b]` (colours are linear emission), `vt u [v [w]]`, `vn`, and `f` with any number of
 //! corners, as `v`, `v/vt`, `v//vn` or `v/vt/vn`, counted from 1 or from the end (-1). Groups, objects, materials, points
 //! and lines are skipped: the file is one mesh. If any corner lacks a normal, all normals are computed; vertices are then
-//! smooth where faces share an index. If any lacks texture coordinates, the mesh has none. Faces of more than three corners become fans, so they
-//! should be convex.
-//!
-//! `tobj` accepts NaN and indices past the end (some of which it wraps around), panics on faces without corners, and
-//! invents missing normals. So every line is checked here first, which also provides the line numbers for messages, and
-//! `tobj` receives only checked lines with plain indices.
+//! smooth where faces share an index. If any lacks texture coordinates, the mesh has none. Faces of more than three
+//! corners become fans, so they should be convex.
 
 use std::collections::HashMap;
-use std::fmt::Write as _;
 use std::path::Path;
 
 use glam::{Vec2, Vec3};
@@ -31,9 +26,9 @@ impl Mesh {
     /// Reads OBJ text from memory, for files embedded in the binary; `path` is only for messages and the name.
     pub fn parse(bytes: &[u8], path: &Path) -> Result<Self> {
         let text = super::utf8(path, bytes, FILE_LIMIT_BYTES, "mesh")?;
-        let count = |keyword| text.lines().filter(|l| l.split_whitespace().next() == Some(keyword)).count();
-        let mut scan =
-            Scan { position_total: count("v"), uv_total: count("vt"), normal_total: count("vn"), ..Default::default() };
+        let total = |keyword| text.lines().filter(|l| l.split_whitespace().next() == Some(keyword)).count();
+        let totals = Totals { positions: total("v"), uvs: total("vt"), normals: total("vn") };
+        let mut scan = Scan { totals, ..Default::default() };
         for (index, line) in text.lines().enumerate() {
             scan.line(line).map_err(|what| Error::input_at(path, index + 1, what))?;
         }
@@ -42,28 +37,34 @@ impl Mesh {
     }
 }
 
-/// State of the reader: counts against which indices are checked, and the checked lines for `tobj`.
+/// Numbers of lines in the whole file, which faces may use before they come.
+#[derive(Default)]
+struct Totals {
+    positions: usize,
+    uvs: usize,
+    normals: usize,
+}
+
+/// What was read so far.
 #[derive(Default)]
 struct Scan {
-    checked: String,
-    position_total: usize,
-    uv_total: usize,
-    normal_total: usize,
-    position_count: usize,
-    uv_count: usize,
-    color_count: usize,
-    normal_count: usize,
-    triangle_count: usize,
-    faces: Vec<Vec<Corner>>,
+    totals: Totals,
+    positions: Vec<Vec3>,
+    /// One a position, or none at all.
+    colors: Vec<Vec3>,
+    uvs: Vec<Vec2>,
+    normals: Vec<Vec3>,
+    triangles: Vec<[Corner; 3]>,
     lacks_uvs: bool,
     lacks_normals: bool,
 }
 
-/// Numbers of a corner's position, texture coordinates and normal, counted from 1.
+/// Numbers of a corner's position, texture coordinates and normal, counted from 0.
+#[derive(Clone, Copy, PartialEq, Eq, Hash)]
 struct Corner {
-    position: usize,
-    uv: Option<usize>,
-    normal: Option<usize>,
+    position: u32,
+    uv: Option<u32>,
+    normal: Option<u32>,
 }
 
 impl Scan {
@@ -80,23 +81,22 @@ impl Scan {
 
     fn position(&mut self, values: &[f32]) -> std::result::Result<(), String> {
         let (xyz, rest) = values.split_at_checked(3).ok_or("a position needs three numbers")?;
-        let colored = match rest {
-            [] => false,
-            [w] if *w == 1.0 => false,
+        let color = match rest {
+            [] => None,
+            [w] if *w == 1.0 => None,
             [w] => return Err(format!("weight {w}: only 1 is supported")),
-            [r, g, b] if r.min(*g).min(*b) >= 0.0 => true,
+            [r, g, b] if r.min(*g).min(*b) >= 0.0 => Some(Vec3::new(*r, *g, *b)),
             [_, _, _] => return Err("a colour is negative".into()),
             _ => return Err(format!("a position has 3, 4 or 6 numbers, not {}", values.len())),
         };
         if let Some(far) = xyz.iter().find(|c| c.abs() > COORDINATE_LIMIT_M) {
             return Err(format!("coordinate {far} is beyond the limit of {COORDINATE_LIMIT_M:e} m"));
         }
-        if colored != (self.color_count > 0) && self.position_count > 0 {
+        if color.is_none() != self.colors.is_empty() && !self.positions.is_empty() {
             return Err("some positions have colours and some have none".into());
         }
-        self.position_count += 1;
-        self.color_count += usize::from(colored);
-        self.write("v", if colored { values } else { xyz });
+        self.positions.push(Vec3::from_slice(xyz));
+        self.colors.extend(color);
         Ok(())
     }
 
@@ -104,26 +104,17 @@ impl Scan {
         if values.len() != 3 {
             return Err(format!("a normal has 3 numbers, not {}", values.len()));
         }
-        self.normal_count += 1;
-        self.write("vn", values);
+        self.normals.push(Vec3::from_slice(values));
         Ok(())
     }
 
     fn uv(&mut self, values: &[f32]) -> std::result::Result<(), String> {
-        let uv = match values {
-            [u] => [*u, 0.0],
-            [u, v] | [u, v, _] => [*u, *v],
+        self.uvs.push(match values {
+            [u] => Vec2::new(*u, 0.0),
+            [u, v] | [u, v, _] => Vec2::new(*u, *v),
             _ => return Err(format!("texture coordinates are 1 to 3 numbers, not {}", values.len())),
-        };
-        self.uv_count += 1;
-        self.write("vt", &uv);
+        });
         Ok(())
-    }
-
-    fn write(&mut self, keyword: &str, values: &[f32]) {
-        self.checked += keyword;
-        values.iter().for_each(|v| self.checked += &format!(" {v:?}"));
-        self.checked += "\n";
     }
 
     fn face<'a>(&mut self, words: impl Iterator<Item = &'a str>) -> std::result::Result<(), String> {
@@ -133,82 +124,48 @@ impl Scan {
             if parts.len() > 3 {
                 return Err(format!("malformed corner {word:?}"));
             }
-            let position = index(parts[0], self.position_count, self.position_total, "position")?;
+            let position = index(parts[0], self.positions.len(), self.totals.positions, "position")?;
             // Without texture coordinates a mesh only loses its texture.
-            let uv = parts.get(1).and_then(|part| index(part, self.uv_count, self.uv_total, "texture coordinate").ok());
-            let normal = parts.get(2).map(|part| index(part, self.normal_count, self.normal_total, "normal"));
+            let uv = parts.get(1).and_then(|part| index(part, self.uvs.len(), self.totals.uvs, "texture").ok());
+            let normal = parts.get(2).map(|part| index(part, self.normals.len(), self.totals.normals, "normal"));
             let normal = normal.transpose()?;
             self.lacks_uvs |= uv.is_none();
             self.lacks_normals |= normal.is_none();
             corners.push(Corner { position, uv, normal });
         }
-        let corner_count = corners.len();
-        if corner_count < 3 {
-            return Err(format!("a face needs at least three corners, not {corner_count}"));
+        if corners.len() < 3 {
+            return Err(format!("a face needs at least three corners, not {}", corners.len()));
         }
-        self.triangle_count += corner_count - 2;
-        if self.triangle_count > TRIANGLE_LIMIT {
+        if self.triangles.len() + corners.len() - 2 > TRIANGLE_LIMIT {
             return Err(format!("over the limit of {TRIANGLE_LIMIT} triangles"));
         }
-        self.faces.push(corners);
+        self.triangles.extend(corners[1..].windows(2).map(|pair| [corners[0], pair[0], pair[1]]));
         Ok(())
     }
 
-    fn into_mesh(mut self, name: &str) -> Result<Mesh> {
-        if self.triangle_count == 0 {
-            return Err(Error::Input("no faces".into()));
-        }
-        let number = |of: Option<usize>, lacks: bool| of.filter(|_| !lacks).map_or(String::new(), |n| n.to_string());
-        for face in &self.faces {
-            self.checked += "f";
-            for Corner { position, uv, normal } in face {
-                // Writing into a string cannot fail.
-                let uv = number(*uv, self.lacks_uvs);
-                let _ = match number(*normal, self.lacks_normals) {
-                    normal if normal.is_empty() => write!(self.checked, " {position}/{uv}"),
-                    normal => write!(self.checked, " {position}/{uv}/{normal}"),
-                };
-            }
-            self.checked += "\n";
-        }
-        let options = tobj::LoadOptions { triangulate: true, ..Default::default() };
-        let (models, _) = tobj::load_obj_buf(&mut self.checked.as_bytes(), &options, |_| Ok(Default::default()))
-            .map_err(|e| Error::Input(e.to_string()))?;
-        let [model] = &models[..] else { return Err(Error::Input(format!("{} objects instead of one", models.len()))) };
-        join_indices(name, &model.mesh, !self.lacks_uvs, !self.lacks_normals)
+    /// Gives every triple of position, texture coordinates and normal in use a vertex of its own.
+    fn into_mesh(self, name: &str) -> Result<Mesh> {
+        let mut positions = Vec::new();
+        let mut normals = Vec::new();
+        let mut uvs = Vec::new();
+        let mut colors = Vec::new();
+        let mut vertices = HashMap::new();
+        let mut vertex = |corner: Corner| {
+            let uv = corner.uv.filter(|_| !self.lacks_uvs);
+            let normal = corner.normal.filter(|_| !self.lacks_normals);
+            *vertices.entry(Corner { uv, normal, ..corner }).or_insert_with(|| {
+                positions.push(self.positions[corner.position as usize]);
+                uvs.extend(uv.map(|uv| self.uvs[uv as usize]));
+                normals.extend(normal.map(|normal| self.normals[normal as usize]));
+                colors.extend(self.colors.get(corner.position as usize));
+                positions.len() as u32 - 1
+            })
+        };
+        let triangles = self.triangles.iter().map(|triangle| triangle.map(&mut vertex)).collect();
+        let colors = (!colors.is_empty()).then_some(colors);
+        let uvs = (!self.lacks_uvs).then_some(uvs);
+        Mesh::with_attributes(name, positions, normals, Attributes { colors, uvs, tints: None }, triangles)
     }
-}
-
-/// Gives every triple of position, texture coordinates and normal in use a vertex of its own.
-fn join_indices(name: &str, from: &tobj::Mesh, has_uvs: bool, has_normals: bool) -> Result<Mesh> {
-    let triple = |values: &[f32], i: u32| Vec3::from_slice(&values[3 * i as usize..]);
-    let mut positions = Vec::new();
-    let mut normals = Vec::new();
-    let mut uvs = Vec::new();
-    let mut colors = Vec::new();
-    let mut vertices = HashMap::new();
-    let mut corners = Vec::with_capacity(from.indices.len());
-    for (k, &position) in from.indices.iter().enumerate() {
-        let uv = if has_uvs { from.texcoord_indices[k] } else { 0 };
-        let normal = if has_normals { from.normal_indices[k] } else { 0 };
-        corners.push(*vertices.entry((position, uv, normal)).or_insert_with(|| {
-            positions.push(triple(&from.positions, position));
-            if has_uvs {
-                uvs.push(Vec2::from_slice(&from.texcoords[2 * uv as usize..]));
-            }
-            if has_normals {
-                normals.push(triple(&from.normals, normal));
-            }
-            if !from.vertex_color.is_empty() {
-                colors.push(triple(&from.vertex_color, position));
-            }
-            positions.len() as u32 - 1
-        }));
-    }
-    let triangles = corners.chunks_exact(3).map(|t| [t[0], t[1], t[2]]).collect();
-    let colors = (!colors.is_empty()).then_some(colors);
-    let attributes = Attributes { colors, uvs: has_uvs.then_some(uvs), tints: None };
-    Mesh::with_attributes(name, positions, normals, attributes, triangles)
 }
 
 /// The numbers of a line, each finite as f32.
@@ -222,49 +179,13 @@ fn numbers<'a>(words: impl Iterator<Item = &'a str>) -> std::result::Result<Vec<
         .collect()
 }
 
-/// An index counted from 1, or back from the `count` lines so far if negative, as one counted from 1.
-fn index(word: &str, count: usize, total: usize, of: &str) -> std::result::Result<usize, String> {
+/// An index counted from 1, or back from the `count` lines so far if negative, as one counted from 0.
+fn index(word: &str, count: usize, total: usize, of: &str) -> std::result::Result<u32, String> {
     let value: i64 = word.parse().map_err(|_| format!("malformed {of} index {word:?}"))?;
     let plain = if value < 0 { value.saturating_add(count as i64 + 1) } else { value };
     if plain < 1 || plain > total as i64 {
         return Err(format!("{of} index {value} is out of range: the file has {total} ({count} up to here)"));
     }
-    Ok(plain as usize)
-}
-
-/// The mesh as OBJ text, which reads back as the same bits, but for tints, which have no place in it. Equal normals are
-/// written once.
-pub fn write_obj(mesh: &Mesh) -> String {
-    let mut text =
-        format!("# {}: {} vertices, {} triangles, metres\n", mesh.name, mesh.positions.len(), mesh.triangles.len());
-    // Writing into a string cannot fail. Rust prints the shortest digits that read back as the same f32.
-    for (i, p) in mesh.positions.iter().enumerate() {
-        let _ = write!(text, "v {} {} {}", p.x, p.y, p.z);
-        if let Some(colors) = &mesh.colors {
-            let _ = write!(text, " {} {} {}", colors[i].x, colors[i].y, colors[i].z);
-        }
-        text += "\n";
-    }
-    let mut numbers = HashMap::new();
-    let mut normal_of = Vec::with_capacity(mesh.normals.len());
-    for n in &mesh.normals {
-        let next = numbers.len() + 1;
-        let number = *numbers.entry(n.to_array().map(f32::to_bits)).or_insert(next);
-        if number == next {
-            let _ = writeln!(text, "vn {} {} {}", n.x, n.y, n.z);
-        }
-        normal_of.push(number);
-    }
-    for uv in mesh.uvs.iter().flatten() {
-        let _ = writeln!(text, "vt {} {}", uv.x, uv.y);
-    }
-    for t in &mesh.triangles {
-        text += "f";
-        for &i in t {
-            let uv = if mesh.uvs.is_some() { (i + 1).to_string() } else { String::new() };
-            let _ = write!(text, " {}/{uv}/{}", i + 1, normal_of[i as usize]);
-        }
-        text += "\n";
-    }
-    text
+    // A file has fewer lines than u32 counts.
+    Ok((plain - 1) as u32)
 }

@@ -1,6 +1,5 @@
 //! Every parser and decoder, with the inputs that mutation starts from.
 
-use super::common::generate;
 use super::{farm, stored};
 use glam::DVec3;
 use shadow_fields::asset::equirect::Equirect;
@@ -54,7 +53,7 @@ pub const TARGETS: &[Target] = &[
         name: "lattice",
         seeds: lattices,
         tokens: "\
-            cube:|x|,inner=|,outer=|,edges|,edges=auto|,round|,centre=|,stretch=|:",
+            cube:|x|,inner=|,outer=|,edges|,edges=auto|:",
         parse: lattice,
         reads_file: false,
     },
@@ -90,7 +89,7 @@ const OPTIONS: &str = "\
 
 fn meshes() -> Vec<Vec<u8>> {
     let cut = "v 0 0 0 1 0 0\nv 1 0 0 0 1 0\nv 0 1 0 0 0 1\nvn 0 0 1\nvt 0 0\nf 1/1/1 2/1/1 3//1\nf -1 -2 -3\n# end\n";
-    vec![shadow_fields::asset::obj::write_obj(&generate::cuboid(glam::Vec3::ONE, 1)).into_bytes(), cut.into()]
+    vec![embedded::read(Path::new("assets/meshes/cuboid.obj")).unwrap(), cut.into()]
 }
 
 fn mesh(bytes: &[u8]) -> Result<()> {
@@ -207,14 +206,7 @@ fn decode(bytes: &[u8]) -> Result<()> {
 }
 
 fn lattices() -> Vec<Vec<u8>> {
-    [
-        "cube:20x7",
-        "cube:8x5,inner=0.9,outer=5,edges",
-        "cube:2x3,round",
-        "cube:3x3,centre=0:1:0,stretch=1:1:2,edges=auto",
-    ]
-    .map(|text| text.into())
-    .into()
+    ["cube:20x7", "cube:8x5,inner=0.9,outer=5,edges"].map(|text| text.into()).into()
 }
 
 fn lattice(bytes: &[u8]) -> Result<()> {

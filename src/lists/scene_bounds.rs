@@ -83,7 +83,7 @@ pub struct EntityBounds {
     pub coloured: bool,
     /// Largest radiance that it shines with, of any colour.
     pub radiance: f64,
-    /// Axis (world) and half-angle of a cone of directions outside of which its radiance field is zero.
+    /// Axis (world) and half-angle of the cone that it shines into, if it is a spot.
     pub facing: Option<(DVec3, f64)>,
     /// The rectangle by which it casts shadows.
     pub sheet: Option<Sheet>,
@@ -102,8 +102,8 @@ pub struct OutlineView {
 /// A light as the gather sees it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ListLight {
-    /// Axis (world) and cosine of the half-angle, with `CONE_ROUNDING_RAD`, of a cone of directions outside of which
-    /// its radiance field is zero; cosine -2 where it shines all round.
+    /// Axis (world) and cosine of the half-angle, with `CONE_ROUNDING_RAD`, of the cone of a spot; cosine -2 where it
+    /// shines all round.
     pub facing: [f32; 4],
     /// Largest radiance that it shines with, of any colour.
     pub radiance: f32,
@@ -209,7 +209,7 @@ pub struct Counts {
     pub below_horizon: u64,
     /// Occluders whose cones do not meet the light's anywhere in the cluster.
     pub apart: u64,
-    /// Lights whose field is zero on the side of the cluster, and occluders in front of them.
+    /// Spots that do not shine on the cluster, and occluders in front of them.
     pub facing_away: u64,
     /// Lights and occluders bounded below eps.
     pub below_eps: u64,

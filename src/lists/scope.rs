@@ -42,7 +42,7 @@ pub enum CullResult {
     PassedBy,
     /// It blocks every ray from the cluster to the sharp light, or is such a light.
     Covered,
-    /// No vertex is on the side to which it shines.
+    /// No vertex is within the cone of a spot.
     FacingAway,
     /// The radiosity that goes with it is bounded by this, which is below eps.
     BelowEps(f64),

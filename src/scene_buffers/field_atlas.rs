@@ -3,7 +3,6 @@
 use super::ALIGNMENT;
 use crate::bake::{self, BakedMesh};
 use crate::error::Result;
-use crate::field::extent::{Extent, extent};
 use crate::field::quantity::{Storage, channel_stride};
 use crate::field::visibility_volume::VisibilityVolume;
 use crate::field::{Area, FieldHeader, FieldKind, ShadowField};
@@ -20,8 +19,8 @@ pub struct FieldSlot {
     pub header: FieldHeader,
     /// The bytes of the field in the atlas.
     pub bytes: Range<u64>,
-    /// Directions in which the field is not zero.
-    pub extent: Extent,
+    /// Whether it holds nothing but zeros.
+    pub is_empty: bool,
     /// The area that its object covers from afar, if this is an occlusion field.
     pub area: Area,
 }
@@ -60,7 +59,7 @@ pub(super) fn field_atlas(
             distinct.push((field.clone(), bytes.start));
             let is_occlusion = field.header.kind == FieldKind::Occlusion;
             let area = if is_occlusion { Area::new(field) } else { Area::default() };
-            FieldSlot { header: field.header.clone(), bytes, extent: extent(field), area }
+            FieldSlot { header: field.header.clone(), bytes, is_empty: field.is_empty(), area }
         });
         FieldSlot { header: FieldHeader { mesh: name.to_owned(), ..slot.header.clone() }, ..slot.clone() }
     };

@@ -13,7 +13,6 @@ use crate::bake::{self, BakedScene, BakedSurface};
 use crate::draw::DrawnMesh;
 use crate::error::Result;
 use crate::field::ShadowField;
-use crate::field::extent::Extent;
 use crate::field::quantity::channel_stride;
 use crate::field::self_visibility::{self, BYTES};
 use crate::field::sheet::Rectangle;
@@ -74,7 +73,7 @@ impl DeviceMesh {
     /// Whether the mesh has the field with which an entity shades or shines, and that field holds only zeros.
     pub fn is_empty(&self, emits: bool) -> bool {
         let source = if emits && self.radiance.is_some() { &self.radiance } else { &self.blocked };
-        source.as_ref().is_some_and(|slot| slot.extent == Extent::Nothing)
+        source.as_ref().is_some_and(|slot| slot.is_empty)
     }
 }
 
@@ -233,7 +232,7 @@ impl SceneBuffers {
     /// Whether an entity has an occlusion field that holds anything.
     pub fn shadows(&self, scene: &Scene, entity: usize) -> bool {
         let blocked = &self.meshes[scene.entities[entity].mesh].blocked;
-        blocked.as_ref().is_some_and(|slot| slot.extent != Extent::Nothing)
+        blocked.as_ref().is_some_and(|slot| !slot.is_empty)
     }
 
     /// Device memory of all textures, bytes.

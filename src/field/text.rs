@@ -1,10 +1,9 @@
 //! Text form of lattices, which the command line parses and prints.
 
-use super::Fit;
 use super::lattice::{AUTOMATIC, Lattice};
 
 impl std::fmt::Display for Lattice {
-    /// Writes the text that parsing accepts.
+    /// Writes the text that parsing accepts, and the fit to an object, which a bake chooses.
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         write!(f, "cube:{}x{}", self.shells, self.cells)?;
         if self.inner != AUTOMATIC {
@@ -18,7 +17,6 @@ impl std::fmt::Display for Lattice {
         }
         let words = |of: [f64; 3]| of.map(|x| x.to_string()).join(":");
         match self.fit {
-            Some(fit) if fit == Fit::ROUND => write!(f, ",round"),
             Some(fit) => write!(f, ",centre={},stretch={}", words(fit.centre), words(fit.stretch)),
             None => Ok(()),
         }
@@ -28,13 +26,11 @@ impl std::fmt::Display for Lattice {
 impl std::str::FromStr for Lattice {
     type Err = String;
 
-    /// `cube:SHELLSxCELLS`, then any of `,inner=R` `,outer=R` `,edges` `,edges=auto` `,round`, or `,centre=X:Y:Z` and
-    /// `,stretch=X:Y:Z`.
+    /// `cube:SHELLSxCELLS`, then any of `,inner=R` `,outer=R` `,edges` `,edges=auto`.
     fn from_str(text: &str) -> std::result::Result<Self, String> {
         let explain = || {
             format!(
-                "cannot read lattice \"{text}\": expected cube:20x7, then any of ,inner=R ,outer=R ,edges ,edges=auto \
-                 ,round"
+                "cannot read lattice \"{text}\": expected cube:20x7, then any of ,inner=R ,outer=R ,edges ,edges=auto"
             )
         };
         let mut words = text.split(',');
@@ -48,26 +44,11 @@ impl std::str::FromStr for Lattice {
                 Some(("edges", "auto")) => lattice.edges = None,
                 Some(("inner", radius)) => lattice.inner = radius.parse().map_err(|_| explain())?,
                 Some(("outer", radius)) => lattice.outer = radius.parse().map_err(|_| explain())?,
-                Some(("centre", words)) => {
-                    lattice.fit.get_or_insert(Fit::ROUND).centre = triple(words).ok_or_else(explain)?;
-                }
-                Some(("stretch", words)) => {
-                    lattice.fit.get_or_insert(Fit::ROUND).stretch = triple(words).ok_or_else(explain)?;
-                }
-                _ => match word {
-                    "edges" => lattice.edges = Some(true),
-                    "round" => lattice.fit = Some(Fit::ROUND),
-                    _ => return Err(explain()),
-                },
+                None if word == "edges" => lattice.edges = Some(true),
+                _ => return Err(explain()),
             }
         }
         lattice.validate().map_err(|error| error.to_string())?;
         Ok(lattice)
     }
-}
-
-/// Three numbers separated by colons.
-fn triple(words: &str) -> Option<[f64; 3]> {
-    let numbers: Vec<f64> = words.split(':').map(|w| w.parse().ok()).collect::<Option<_>>()?;
-    numbers.try_into().ok()
 }

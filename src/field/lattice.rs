@@ -42,7 +42,6 @@ pub fn cap_height(d: f64) -> f64 {
 /// are dense around d = 1, where the blocked part varies fastest. b / (1 - c) is stored and interpolated.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Lattice {
-    /// Number of shells, at least 1.
     pub shells: u32,
     /// Radius of the innermost shell, in r.
     pub inner: f64,
@@ -166,7 +165,6 @@ impl Lattice {
         self
     }
 
-    /// Where the lattice lies around the object.
     pub fn fit(&self) -> Fit {
         self.fit.unwrap_or(Fit::ROUND)
     }
@@ -200,7 +198,6 @@ impl Lattice {
         self.shells * self.direction_count()
     }
 
-    /// Samples as stored, borders included.
     pub fn stored_count(&self) -> u32 {
         self.shells * self.stored_direction_count()
     }

@@ -17,7 +17,6 @@ impl Multiplier {
         Multiplier { tensor: Tensor::new(bands, field_bands, bands) }
     }
 
-    /// The chain without a factor.
     pub fn begin(&self, transfer: &[f64]) -> ChainState {
         let mut state = [0.0; MAX_COEFFICIENTS];
         state[..transfer.len()].copy_from_slice(transfer);
@@ -61,7 +60,6 @@ impl Multiplier {
     }
 }
 
-/// The square of the length of all coefficients but the first.
 fn rest(state: &ChainState) -> f64 {
     dot(&state[1..], &state[1..])
 }

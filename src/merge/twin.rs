@@ -13,7 +13,6 @@ use glam::{DQuat, DVec3};
 use rayon::prelude::*;
 use std::f64::consts::PI;
 
-/// One object, as the merge sees it.
 pub struct MergeObject<'f> {
     /// Centre of the bounding sphere in the world, metres.
     pub centre: DVec3,
@@ -36,7 +35,6 @@ pub struct MergeObject<'f> {
 
 pub struct MergeTwin<'t> {
     pub objects: &'t [MergeObject<'t>],
-    /// Index of the one that is lit.
     pub receiver: usize,
     /// Occluders in the order in which they are multiplied.
     pub occluders: &'t [usize],
@@ -219,9 +217,7 @@ pub fn sheet_before(sheet: &SheetView, to: DVec3, radius_m: f64, skip: Skip) -> 
 /// A bounding sphere as a cone in a vertex's view: the twin of `glsl/merge_cone.glsl`, in angles.
 #[derive(Clone, Copy, Debug)]
 pub struct Cone {
-    /// Unit direction of the sphere's centre.
     pub toward: DVec3,
-    /// Distance of the sphere's centre, metres.
     pub distance: f64,
     half_angle_rad: Option<f64>,
 }
@@ -295,7 +291,6 @@ impl Cap {
         Cap { solid_angle: self.solid_angle * share, ..self }
     }
 
-    /// Takes it out of a chain.
     pub fn cover(&self, multiplier: &Multiplier, state: &mut ChainState) {
         multiplier.cover(state, &self.y, self.solid_angle);
     }

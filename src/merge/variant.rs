@@ -14,7 +14,6 @@ use crate::shaders::ShaderPermutation;
 use ash::vk;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
-/// How a pass reads what it is given.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Reads {
     /// Everything from storage blocks.
@@ -29,7 +28,6 @@ pub enum Reads {
 /// How the merge is done, where that changes its speed and not its outcome.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct Variant {
-    /// Name on the command line.
     pub name: &'static str,
     pub reads: Reads,
     /// Packed halves become floats by shifts of their bits rather than by the instruction for it.
@@ -103,7 +101,6 @@ pub struct MergePermutation {
     pub skip: Skip,
     /// Whether any light meets a chain. Without, there is the sky's chain alone.
     pub lights: bool,
-    /// Whether any mesh is a sheet.
     pub sheets: bool,
     /// Whether what moves reads all that rests at once.
     pub volume: bool,
@@ -114,7 +111,6 @@ pub struct MergePermutation {
 }
 
 impl MergePermutation {
-    /// Format of the texels that fields are read through.
     pub fn field_format(&self) -> vk::Format {
         match self.storage {
             Storage::F32 => vk::Format::R32G32B32A32_SFLOAT,

@@ -10,7 +10,6 @@ use super::quadrature::sphere_rule;
 /// at 8 bands, and the errors of the sums are below 1e-14.
 const ZERO: f64 = 1e-9;
 
-/// One non-zero entry of a tensor.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Entry {
     pub i: usize,

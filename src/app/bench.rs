@@ -215,7 +215,7 @@ fn print_time_error(outcome: &TimeErrorOutcome) {
 fn print_stability(outcome: &StabilityOutcome) {
     output::say(format!(
         "Irradiance behind chains of caps (1 where nothing blocks). A guarded chain stays from 0 to 1, in f32 within \
-         {NEAR_F32:e} of f64,\nwith factors in f16 within {NEAR_F16:e}; 7 bands of visibility are not guarded"
+         {NEAR_F32:e} of f64,\nwith factors in f16 within {NEAR_F16:e}"
     ));
     let columns = [
         ("caps", "/caps"),
@@ -225,7 +225,6 @@ fn print_stability(outcome: &StabilityOutcome) {
         ("guarded", "/guarded_relative"),
         ("f32", "/guarded_f32_relative"),
         ("f16", "/guarded_f16_relative"),
-        ("7 bands", "/plain_7_bands_relative"),
         ("passed", "/passed"),
     ];
     table(&outcome.chains, &columns);

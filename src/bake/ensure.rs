@@ -87,7 +87,7 @@ impl SceneNeeds {
         let headers = self.meshes.iter().flat_map(|(_, headers)| headers).flatten();
         let distinct = headers.filter(|header| known.insert(field_name(header)));
         let fields: u64 = distinct.map(|header| header.payload_bytes().next_multiple_of(alignment)).sum();
-        let node_bytes = channel_stride(self.options.occlusion_bands()) * self.options.storage.bytes();
+        let node_bytes = channel_stride(self.options.bands) * self.options.storage.bytes();
         let volumes = self.surfaces.groups.iter().filter_map(|group| group.volume.as_ref());
         fields + volumes.map(|volume| (volume.nodes.count() * node_bytes) as u64).sum::<u64>()
     }

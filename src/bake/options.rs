@@ -21,8 +21,6 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Options {
     pub bands: usize,
-    /// SH bands of occlusion fields; `None` means as many as `bands`.
-    pub field_bands: Option<usize>,
     pub storage: Storage,
     /// Sample points. The first shell may be left to the bake.
     pub lattice: Lattice,
@@ -44,7 +42,6 @@ impl Default for Options {
     fn default() -> Self {
         Options {
             bands: 4,
-            field_bands: None,
             storage: Storage::default(),
             lattice: Lattice::default(),
             face_px: 64,
@@ -57,18 +54,9 @@ impl Default for Options {
 }
 
 impl Options {
-    pub fn occlusion_bands(&self) -> usize {
-        self.field_bands.unwrap_or(self.bands)
-    }
-
     /// The share of a texel by which captures of a mesh without colours may miss it.
     pub(super) fn level_texels(&self, mesh: &Mesh) -> f64 {
         if self.levels { levels::texels(mesh) } else { 0.0 }
-    }
-
-    /// SH bands of the kind of field that has the most.
-    pub fn most_bands(&self) -> usize {
-        self.bands.max(self.occlusion_bands())
     }
 }
 
@@ -112,7 +100,7 @@ pub fn header(mesh: &Mesh, kind: FieldKind, options: &Options) -> FieldHeader {
     let brightest = mesh.colors.iter().flatten().map(|c| c.max_element()).fold(0.0, f32::max);
     FieldHeader {
         kind,
-        bands: if kind == FieldKind::Occlusion { options.occlusion_bands() } else { options.bands },
+        bands: options.bands,
         storage: options.storage,
         lattice,
         face_px: options.face_px,
@@ -186,10 +174,6 @@ pub struct BakeOptions {
     /// SH bands of light, transfer and what is stored, 2 to 7, in place of the quality's; N bands are N*N coefficients
     #[cfg_attr(feature = "cli", arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(2..=7)))]
     pub bands: Option<u32>,
-    /// SH bands of occlusion fields if other than --bands; more bands make shadows of many occluders more exact, and
-    /// slower
-    #[cfg_attr(feature = "cli", arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(2..=7)))]
-    pub field_bands: Option<u32>,
     /// Number format of stored coefficients
     #[cfg_attr(feature = "cli", arg(long, value_name = "f16|f32"))]
     pub storage: Option<Storage>,
@@ -208,8 +192,7 @@ impl BakeOptions {
     /// `Input` where a number is out of its range.
     pub fn resolve(self) -> Result<Options> {
         let of_quality = self.quality.options();
-        let bands = [self.bands, self.field_bands].into_iter().flatten();
-        if bands.into_iter().any(|bands| !(2..=7).contains(&bands)) {
+        if self.bands.is_some_and(|bands| !(2..=7).contains(&bands)) {
             return Err(Error::Input("expected 2 to 7 bands".into()));
         }
         let face_px = self.face_px.unwrap_or(of_quality.face_px);
@@ -220,7 +203,6 @@ impl BakeOptions {
             lattice: self.lattice.unwrap_or(of_quality.lattice),
             face_px,
             bands: self.bands.map_or(of_quality.bands, |bands| bands as usize),
-            field_bands: self.field_bands.map(|bands| bands as usize),
             storage: self.storage.unwrap_or(of_quality.storage),
             ..of_quality
         })
@@ -263,8 +245,8 @@ mod tests {
         }
         let lattice = "cube:9x5".parse().unwrap();
         assert_eq!(
-            parsed(&["--quality=draft", "--lattice=cube:9x5", "--face-px=40", "--storage=f32", "--field-bands=5"]),
-            Options { lattice, face_px: 40, storage: Storage::F32, field_bands: Some(5), ..Quality::Draft.options() }
+            parsed(&["--quality=draft", "--lattice=cube:9x5", "--face-px=40", "--storage=f32"]),
+            Options { lattice, face_px: 40, storage: Storage::F32, ..Quality::Draft.options() }
         );
     }
 }

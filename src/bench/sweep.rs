@@ -78,13 +78,6 @@ pub fn variations(quick: bool) -> Vec<Variation> {
         for bands in [3, 5, 6] {
             add("bands", &format!("{bands} bands"), &|o| o.bake.bands = bands);
         }
-        for bands in [5, 6, 7] {
-            add("stored bands", &format!("{bands} of visibility"), &|o| o.bake.field_bands = Some(bands));
-        }
-        add("stored bands", "3 of transfer, 4 of visibility", &|o| {
-            o.bake.bands = 3;
-            o.bake.field_bands = Some(4);
-        });
         add("together", "small: cube:8x5, 16 px", &|o| {
             o.bake.lattice = lattice("cube:8x5");
             o.bake.face_px = 16;

@@ -48,7 +48,7 @@ pub struct MergeTwin<'t> {
     pub normals: &'t [DVec3],
     /// Transfer vectors, `transfer_stride` floats apart; `None` for the cosine of the normal.
     pub transfer: Option<(&'t [f32], usize)>,
-    /// SH bands of transfer and light; an occlusion field has its own.
+    /// SH bands of transfer, light and fields.
     pub bands: usize,
     pub skip: Skip,
     /// Whether a vertex leaves out an entity in the chain of a light (`None`: of the sky), or the light itself where
@@ -61,16 +61,9 @@ type Coefficients = [f64; MAX_COEFFICIENTS];
 impl MergeTwin<'_> {
     /// Radiosity of every vertex: linear RGB radiance that leaves the surface, without emission.
     pub fn run(&self) -> Vec<[f64; 3]> {
-        let field_bands = self.field_bands();
-        let multiplier = Multiplier::new(self.bands, field_bands);
-        let bands = self.bands.max(field_bands);
-        let rotations: Vec<Rotation> = self.objects.iter().map(|o| Rotation::new(bands, o.rotation)).collect();
+        let multiplier = Multiplier::new(self.bands);
+        let rotations: Vec<Rotation> = self.objects.iter().map(|o| Rotation::new(self.bands, o.rotation)).collect();
         (0..self.positions.len()).into_par_iter().map(|v| self.vertex(v, &multiplier, &rotations)).collect()
-    }
-
-    /// SH bands of the occlusion fields, which all have the same.
-    fn field_bands(&self) -> usize {
-        self.objects.iter().find_map(|o| o.blocked).map_or(self.bands, |field| field.header.bands)
     }
 
     fn vertex(&self, v: usize, multiplier: &Multiplier, rotations: &[Rotation]) -> [f64; 3] {
@@ -119,7 +112,7 @@ impl MergeTwin<'_> {
                 None => chain(begun, &|j| counts(j, true)),
                 Some(volume) => {
                     let one_by_one = chain(begun, &|j| counts(j, volume.has[j]));
-                    let (share, blocked) = volume.volume.lookup(position, self.field_bands());
+                    let (share, blocked) = volume.volume.lookup(position, self.bands);
                     let mut at_once = begun;
                     multiplier.multiply(&mut at_once, &blocked);
                     let mixed = std::array::from_fn(|k| one_by_one[k] + share * (at_once[k] - one_by_one[k]));

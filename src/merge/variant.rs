@@ -91,10 +91,8 @@ pub fn uniform_entities(device: &Device) -> u32 {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MergePermutation {
     pub variant: Variant,
-    /// SH bands of transfer, light and products.
+    /// SH bands of transfer, light and fields.
     pub bands: usize,
-    /// SH bands of occlusion fields.
-    pub field_bands: usize,
     pub storage: Storage,
     /// Samples of the fields. First and last shell are data, not code.
     pub lattice: Lattice,
@@ -124,9 +122,7 @@ impl MergePermutation {
     }
 
     fn packed(&self) -> bool {
-        self.reads_texels()
-            && self.storage == Storage::F16
-            && [self.bands, self.field_bands].iter().all(|&bands| channel_stride(bands).is_multiple_of(8))
+        self.reads_texels() && self.storage == Storage::F16 && channel_stride(self.bands).is_multiple_of(8)
     }
 
     pub fn row(&self) -> ShaderPermutation {
@@ -137,7 +133,6 @@ impl MergePermutation {
     pub fn row_of(&self, file: &'static str) -> ShaderPermutation {
         let lattice = self.lattice;
         let row = ShaderPermutation::new(file, self.bands)
-            .field_bands(self.field_bands)
             .number("Y00", Y00)
             .define("WORKGROUP", CLUSTER_VERTICES)
             .define("ENTRY_BITS", ENTRY_BITS)

@@ -3,7 +3,7 @@
 use super::ALIGNMENT;
 use crate::bake::{self, BakedMesh};
 use crate::error::Result;
-use crate::field::quantity::{Storage, channel_stride};
+use crate::field::quantity::Storage;
 use crate::field::visibility_volume::VisibilityVolume;
 use crate::field::{Area, FieldHeader, FieldKind, ShadowField};
 use crate::gpu::{Buffer, BufferKind, Device};
@@ -73,10 +73,7 @@ pub(super) fn field_atlas(
         Storage::F16 => volume.blocked.iter().flat_map(|b| f16::from_f32(*b).to_le_bytes()).collect(),
     });
     let total = total + payload.len() as u64;
-    // Where bands differ, the shader reads as much of any sample as the kind with more bands has. After the last sample
-    // it reads on.
-    let overrun = if options.field_bands.is_some() { 8 * channel_stride(options.most_bands()) as u64 } else { 0 };
-    let mut fields = Buffer::new(device, "fields", BufferKind::Device, total.max(ALIGNMENT) + overrun)?;
+    let mut fields = Buffer::new(device, "fields", BufferKind::Device, total.max(ALIGNMENT))?;
     for (field, first) in distinct {
         fields.fill(first, &field.payload)?;
     }

@@ -12,7 +12,6 @@ pub mod silhouette;
 pub mod silhouette_header;
 pub mod silhouette_nodes;
 pub mod sub_light;
-mod text;
 pub mod visibility_volume;
 
 pub use area::Area;

@@ -1,4 +1,4 @@
-//! Meshes: generators against closed forms, derived properties, the enclosing sphere, and OBJ files there and back.
+//! Meshes: generators against closed forms, derived properties, the enclosing sphere, and OBJ files.
 
 use crate::common::generate;
 use std::f64::consts::{PI, TAU};

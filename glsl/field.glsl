@@ -3,9 +3,7 @@
 // conditions, of which the compiler keeps one side; only what a driver must not see is left to the preprocessor: how
 // fields are bound and read.
 
-const uint FIELD_QUADS = FIELD_STRIDE / 4; // of an occlusion sample
-const uint CHANNEL_QUADS = STRIDE / 4;     // of a channel of radiance, and of a transfer vector
-const uint FETCHED_QUADS = FIELD_QUADS > CHANNEL_QUADS ? FIELD_QUADS : CHANNEL_QUADS;
+const uint CHANNEL_QUADS = STRIDE / 4; // of a sample of occlusion, a channel of radiance, and a transfer vector
 
 // Samples that a lookup interpolates: the corners of a tetrahedron.
 const uint CORNERS = 4;
@@ -93,10 +91,10 @@ FieldPlace field_place(vec3 p, vec4 radial, float edges) {
 #include "field_quads.glsl"
 #endif
 
-void field_gather(FieldPlace place, uint base, uint sample_quads, out float b[FETCHED]) {
-    vec4 sums[FETCHED_QUADS];
+void field_gather(FieldPlace place, uint base, uint sample_quads, out float b[COEFFICIENTS]) {
+    vec4 sums[CHANNEL_QUADS];
     field_sums(place, base, sample_quads, sums);
-    [[unroll]] for (uint i = 0; i < FETCHED; i++) {
+    [[unroll]] for (uint i = 0; i < COEFFICIENTS; i++) {
         b[i] = sums[i / 4][i % 4];
     }
 }

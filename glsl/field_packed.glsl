@@ -11,12 +11,12 @@ vec2 field_pair(uint halves) {
     return unpackHalf2x16(halves);
 }
 
-void field_sums(FieldPlace place, uint base, uint sample_quads, out vec4 sums[FETCHED_QUADS]) {
+void field_sums(FieldPlace place, uint base, uint sample_quads, out vec4 sums[CHANNEL_QUADS]) {
     int at[CORNERS];
     [[unroll]] for (uint k = 0; k < CORNERS; k++) {
         at[k] = int((base + place.corner[k] * sample_quads) / 2);
     }
-    [[unroll]] for (uint q = 0; q < FETCHED_QUADS; q += 2) {
+    [[unroll]] for (uint q = 0; q < CHANNEL_QUADS; q += 2) {
         // All corners are read before any is used: a processor keeps nothing in registers while it reads a texel, a GPU
         // waits once.
         uvec4 halves[CORNERS];

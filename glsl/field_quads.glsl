@@ -10,8 +10,8 @@ vec4 field_quad(uint i) {
 READ_VEC4(FIELD_BINDING, FieldQuads, field_quads, field_quad)
 #endif
 
-void field_sums(FieldPlace place, uint base, uint sample_quads, out vec4 sums[FETCHED_QUADS]) {
-    [[unroll]] for (uint q = 0; q < FETCHED_QUADS; q++) {
+void field_sums(FieldPlace place, uint base, uint sample_quads, out vec4 sums[CHANNEL_QUADS]) {
+    [[unroll]] for (uint q = 0; q < CHANNEL_QUADS; q++) {
         // All corners are read before any is used, as in field_packed.glsl.
         vec4 quads[CORNERS];
         [[unroll]] for (uint k = 0; k < CORNERS; k++) {

@@ -103,25 +103,16 @@ void look(Vertex vertex, uint packed, float t_start[CHAIN], inout float t[CHAIN]
     weight *= shines ? 1.0 : counts;
     vec3 p = to_lattice(entity, to_object(entity, (vertex.position - entity.centre.xyz) * entity.centre.w));
     uint base = of_radiance ? entity.radiance_base + channel * CHANNEL_QUADS : entity.blocked_base;
-    float b[FETCHED];
+    float b[COEFFICIENTS];
     FieldPlace place = field_place(p, entity.radial, lattice_edges(entity));
     [[unroll]] for (uint k = 0; k < CORNERS; k++) {
         place.weight[k] *= weight;
     }
-    field_gather(place, base, of_radiance ? 3 * CHANNEL_QUADS : FIELD_QUADS, b);
-    // Occlusion and radiance of different bands are read alike; what one of them does not have belongs to the next
-    // sample.
-    [[unroll]] for (uint k = FIELD_COEFFICIENTS; k < FETCHED; k++) {
-        b[k] = of_radiance ? b[k] : 0.0;
-    }
+    field_gather(place, base, of_radiance ? 3 * CHANNEL_QUADS : CHANNEL_QUADS, b);
     sh_rotate(b, entity.alpha_beta, entity.gamma);
 
-    float s[COEFFICIENTS];
+    float met = chain_meet(t, b);
     [[unroll]] for (uint k = 0; k < COEFFICIENTS; k++) {
-        s[k] = b[k];
-    }
-    float met = chain_meet(t, s);
-    [[unroll]] for (uint k = 0; k < FETCHED; k++) {
         b[k] = shines ? 0.0 : b[k];
     }
     vec3 color = of_radiance ? vec3(channel == 0, channel == 1, channel == 2) : vec3(1.0);
@@ -164,8 +155,8 @@ void take_volume(Vertex vertex, float t_start[CHAIN], inout float t[CHAIN]) {
     float share = smoothstep(0.0, 1.0, min(min(depth.x, depth.y), depth.z));
     FieldPlace place = simplex(clamp(at, vec3(0.0), last), last - 1.0, vec3(1.0, counts.x, counts.x * counts.y), 0.0,
                                FIELD_UNIT);
-    float b[FETCHED];
-    field_gather(place, VOLUME_UNIT * uint(counts.w), FIELD_QUADS, b);
+    float b[COEFFICIENTS];
+    field_gather(place, VOLUME_UNIT * uint(counts.w), CHANNEL_QUADS, b);
     float through[CHAIN] = t_start;
     chain_multiply(through, b);
     [[unroll]] for (uint k = 0; k < TERMS; k++) {
@@ -189,7 +180,7 @@ void take_sheet(Vertex vertex, uint packed, inout float t[CHAIN]) {
     float before = sheet_before(sheet, cone_of(light, vertex.position), light.w);
     weight *= l == SKY_CHAIN ? 1.0 : before;
 #endif
-    float b[FETCHED];
+    float b[COEFFICIENTS];
     sheet_blocked(sheet, b);
     [[unroll]] for (uint k = 0; k < SHEET_COEFFICIENTS; k++) {
         b[k] *= weight;

@@ -2,7 +2,6 @@
 // vertex's transfer T and is kept as SH coefficients.
 #include "generated/product.glsl"
 
-#define FETCHED (COEFFICIENTS > FIELD_COEFFICIENTS ? COEFFICIENTS : FIELD_COEFFICIENTS)
 #define TERMS COEFFICIENTS
 // The last element of a chain is the square of the length of all but coefficient 0.
 #define CHAIN (TERMS + 1)
@@ -58,16 +57,12 @@ void chain_cover(inout float c[CHAIN], float y[COEFFICIENTS], float solid_angle)
 // A factor between 0 and 1 makes neither the integral of a function that is nowhere negative larger, nor its length.
 // Cut to a few bands it can do both, a little at a time and without end. The guard takes that back: coefficient 0
 // neither grows nor changes sign, and the others are shortened until the whole is no longer than before.
-void chain_multiply(inout float c[CHAIN], float b[FETCHED]) {
+void chain_multiply(inout float c[CHAIN], float blocked[COEFFICIENTS]) {
     float first_before = c[0];
     float rest_before = c[TERMS];
     float t[TERMS];
-    float blocked[FIELD_COEFFICIENTS];
     [[unroll]] for (uint k = 0; k < TERMS; k++) {
         t[k] = c[k];
-    }
-    [[unroll]] for (uint k = 0; k < FIELD_COEFFICIENTS; k++) {
-        blocked[k] = b[k];
     }
     sh_subtract_product(t, blocked);
     [[unroll]] for (uint k = 0; k < TERMS; k++) {

@@ -17,7 +17,7 @@ float angle_of(float y, float x) {
 
 // Adds one side: `normal` is that of the plane through the point and the side, and points inwards; the side's ends
 // together lie in direction `middle`; `sine` and `cosine` are those of the angle between them.
-void add_side(vec3 normal, vec3 middle, float sine, float cosine, inout float b[FETCHED]) {
+void add_side(vec3 normal, vec3 middle, float sine, float cosine, inout float b[COEFFICIENTS]) {
     float angle = angle_of(sine, cosine);
     // Of small angles the cosine is rounded to 1.
     float half_sine = cosine > 0.0 ? sine * inversesqrt(2.0 + 2.0 * cosine) : sqrt(0.5 - 0.5 * cosine);
@@ -34,8 +34,8 @@ void add_side(vec3 normal, vec3 middle, float sine, float cosine, inout float b[
     }
 }
 
-void sheet_blocked(Sheet sheet, out float b[FETCHED]) {
-    [[unroll]] for (uint k = 0; k < FETCHED; k++) {
+void sheet_blocked(Sheet sheet, out float b[COEFFICIENTS]) {
+    [[unroll]] for (uint k = 0; k < COEFFICIENTS; k++) {
         b[k] = 0.0;
     }
     float h = sheet.height;

@@ -9,7 +9,6 @@
 layout(local_size_x = WORKGROUP) in;
 
 const uint NONE = 0xffffffffu;
-const uint FETCHED = FIELD_COEFFICIENTS;
 #include "far.glsl"
 layout(std430, binding = 4) readonly buffer Clusters { Cluster clusters[]; };
 #define FIELD_BINDING 5
@@ -147,13 +146,13 @@ void main() {
         mover.centre.xyz -= receiver.centre.xyz;
         Cone cone = cone_of(mover.centre, position);
         vec3 from = to_object(mover, (position - mover.centre.xyz) * mover.centre.w);
-        float b[FETCHED];
+        float b[COEFFICIENTS];
         field_gather(field_place(to_lattice(mover, from), mover.radial, lattice_edges(mover)), mover.blocked_base,
-                     FIELD_QUADS, b);
+                     CHANNEL_QUADS, b);
         float cosine[COEFFICIENTS];
         sh_cosine(to_object(mover, normal), cosine);
         float share = 0.0;
-        [[unroll]] for (uint k = 0; k < min(COEFFICIENTS, FIELD_COEFFICIENTS); k++) {
+        [[unroll]] for (uint k = 0; k < COEFFICIENTS; k++) {
             share += b[k] * cosine[k];
         }
         share *= above_horizon(cone, normal) * mover.opacity / PI;
@@ -161,7 +160,7 @@ void main() {
         share = max(share, 0.0);
         // From the middle of the directions that the mover blocks: band 1, of which x and y are negative.
         vec3 middle = from;
-#if FIELD_COEFFICIENTS >= 4
+#if COEFFICIENTS >= 4
         middle = vec3(b[3], b[1], -b[2]);
 #endif
         sum += share * seen(e, middle / max(length(middle), 1e-20));

@@ -95,8 +95,6 @@ pub struct ShaderPermutation {
     pub file: &'static str,
     /// SH bands that generated includes are made for; defines BANDS, COEFFICIENTS and STRIDE.
     pub bands: usize,
-    /// SH bands of occlusion fields; defines FIELD_BANDS, FIELD_COEFFICIENTS and FIELD_STRIDE.
-    pub field_bands: usize,
     /// Further macros.
     pub defines: Vec<(&'static str, String)>,
 }
@@ -104,13 +102,7 @@ pub struct ShaderPermutation {
 impl ShaderPermutation {
     /// A permutation without further macros.
     pub fn new(file: &'static str, bands: usize) -> Self {
-        ShaderPermutation { file, bands, field_bands: bands, defines: Vec::new() }
-    }
-
-    /// Sets another number of bands for occlusion fields.
-    pub fn field_bands(mut self, field_bands: usize) -> Self {
-        self.field_bands = field_bands;
-        self
+        ShaderPermutation { file, bands, defines: Vec::new() }
     }
 
     /// Adds a macro.
@@ -158,9 +150,6 @@ impl Library {
             ("BANDS", row.bands),
             ("COEFFICIENTS", sh::basis::coefficient_count(row.bands)),
             ("STRIDE", channel_stride(row.bands)),
-            ("FIELD_BANDS", row.field_bands),
-            ("FIELD_COEFFICIENTS", sh::basis::coefficient_count(row.field_bands)),
-            ("FIELD_STRIDE", channel_stride(row.field_bands)),
         ]
         .into_iter()
         .map(|(name, value)| (name.to_owned(), value.to_string()))
@@ -203,16 +192,11 @@ impl Library {
 /// request includes that it does not use.
 fn generate(name: &str, row: &ShaderPermutation) -> Option<String> {
     let bands = row.bands;
-    let field_bands = row.field_bands;
     match name {
         "basis.glsl" => Some(sh::basis::glsl_basis(bands)),
         "cosine.glsl" => Some(sh::lobe::glsl_clamped_cosine(bands)),
-        "product.glsl" => Some(glsl_subtract(bands, field_bands)),
-        // One overload for each array length.
-        "rotate.glsl" => {
-            let more = if field_bands > bands { glsl_rotate(field_bands) } else { String::new() };
-            Some(glsl_rotate(bands) + &more)
-        }
+        "product.glsl" => Some(glsl_subtract(bands)),
+        "rotate.glsl" => Some(glsl_rotate(bands)),
         _ => layout::glsl(name),
     }
 }

@@ -49,7 +49,7 @@ fn bouncing() -> Vec<ShaderPermutation> {
         let merge = MergePermutation { variant: *variant, ..usual };
         [outgoing_row(&merge), movers_row(&merge, false), movers_row(&merge, true)]
     };
-    let few = MergePermutation { bands: 2, field_bands: 3, ..usual };
+    let few = MergePermutation { bands: 2, ..usual };
     let movers = VARIANTS.iter().flat_map(of_movers).chain([movers_row(&few, true)]);
     [false, true].into_iter().flat_map(rows).chain(movers).collect()
 }
@@ -143,7 +143,6 @@ fn usual_permutation() -> MergePermutation {
     MergePermutation {
         variant: VARIANTS[0],
         bands: 4,
-        field_bands: 4,
         storage: Storage::F16,
         lattice: Lattice { inner: 1.02, ..Lattice::default() },
         skip: Skip::ALL,
@@ -163,28 +162,16 @@ fn merging() -> Vec<ShaderPermutation> {
         ["none", "horizon", "cones", "caps"].map(|skip| MergePermutation { skip: skip.parse().unwrap(), ..usual }),
     );
     // Seven bands take 33 s to optimise, six 5 s, four 0.6 s: seven are left out.
-    permutations.extend((2..=6).map(|bands| MergePermutation { bands, field_bands: bands, ..usual }));
+    permutations.extend((2..=6).map(|bands| MergePermutation { bands, ..usual }));
     for &variant in VARIANTS {
         permutations.extend([Storage::F16, Storage::F32].map(|storage| MergePermutation { variant, storage, ..usual }));
-        permutations.push(MergePermutation {
-            variant,
-            storage: Storage::F32,
-            bands: 3,
-            field_bands: 3,
-            skip: Skip::NONE,
-            ..usual
-        });
+        permutations.push(MergePermutation { variant, storage: Storage::F32, bands: 3, skip: Skip::NONE, ..usual });
     }
     permutations.push(MergePermutation { lattice: lattice("cube:1x1,inner=1.02"), ..usual });
     permutations.push(MergePermutation { lights: false, ..usual });
     permutations.push(MergePermutation { sheets: false, ..usual });
     permutations.push(MergePermutation { volume: true, ..usual });
     permutations.push(MergePermutation { gloss: true, ..usual });
-    permutations.extend([(4, 5), (3, 4), (4, 3)].map(|(bands, field_bands)| MergePermutation {
-        bands,
-        field_bands,
-        ..usual
-    }));
     permutations.push(MergePermutation {
         variant: Variant::named("texel-shifted").unwrap(),
         lattice: lattice("cube:8x3"),

@@ -58,7 +58,6 @@ pub(super) fn check_angle(what: &str, angle_deg: f32) -> Result<()> {
     Err(Error::Input(format!("environment {what} {angle} is not within {low} to {high}")))
 }
 
-/// A distant disc of one radiance.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Disc {
     pub name: &'static str,

@@ -28,7 +28,6 @@ struct Edge {
     kind: EdgeKind,
 }
 
-/// The visible part of an edge.
 #[derive(Clone, Copy, Debug)]
 pub struct Line {
     /// End points in clip space, in front of the eye and within the picture.

@@ -35,7 +35,6 @@ pub struct EnvironmentData {
     /// Rotation of all parts about +y, degrees, counter-clockwise seen from above.
     #[serde(default, skip_serializing_if = "crate::field::is_zero")]
     pub turn_deg: f32,
-    /// The same radiance from all directions.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub uniform: Option<Vec3>,
     /// A sky that brightens towards the zenith.
@@ -47,10 +46,8 @@ pub struct EnvironmentData {
     /// A generated sky; `sky = {}` takes its defaults.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub sky: Option<Sky>,
-    /// An equirectangular picture.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub image: Option<EnvironmentImage>,
-    /// A distant disc.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub sun: Option<Sun>,
 }
@@ -149,7 +146,6 @@ impl EnvironmentData {
         self.within("image", mean * f64::from(image.scale))
     }
 
-    /// Whether no part is given.
     pub fn is_empty(&self) -> bool {
         self.has_at_most_a_sun() && self.sun.is_none()
     }

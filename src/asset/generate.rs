@@ -231,7 +231,6 @@ pub fn torus(major_m: f32, minor_m: f32, segments: u32, sides: u32) -> Mesh {
     ring("torus", major_m, minor_m, segments, sides, None)
 }
 
-/// [`Generator::TorusTwoColour`].
 pub fn torus_two_colour(major_m: f32, minor_m: f32, segments: u32, sides: u32) -> Mesh {
     let color = |p: Vec3| {
         let t = ((f64::from(p.x) / (f64::from(major_m) * BLEND) + 1.0) * 0.5).clamp(0.0, 1.0);
@@ -268,7 +267,6 @@ fn ring(
     finish(name, positions, normals, colors, triangles)
 }
 
-/// [`Generator::Cuboid`].
 pub fn cuboid(size_m: Vec3, cells: u32) -> Mesh {
     let mut positions = Vec::new();
     let mut normals = Vec::new();
@@ -300,17 +298,4 @@ pub fn cuboid(size_m: Vec3, cells: u32) -> Mesh {
         }
     }
     finish("cuboid", positions, normals, None, triangles)
-}
-
-/// The meshes of `assets/meshes`: what [`super::embedded`] offers and `scripts/meshes` writes. The teapot has about 6 000
-/// triangles.
-pub fn library() -> Vec<Mesh> {
-    vec![
-        plane(6.0, 32),
-        sphere(0.5, 3),
-        torus(0.5, 0.2, 48, 24),
-        torus_two_colour(0.5, 0.15, 48, 20),
-        cuboid(Vec3::ONE, 6),
-        teapot(10),
-    ]
 }

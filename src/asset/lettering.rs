@@ -26,21 +26,3 @@ pub fn write(rgb: &mut [f32], picture_width: usize, (x, y): (usize, usize), size
         }
     }
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn letters_stand_where_they_should() {
-        let width = 40;
-        let height = 20;
-        let mut rgb = vec![0.0; 3 * width * height];
-        write(&mut rgb, width, (10, 2), 1, [1.0; 3], "-");
-        let lit: Vec<(usize, usize)> =
-            (0..width * height).filter(|i| rgb[3 * i] == 1.0).map(|i| (i % width, i / width)).collect();
-        assert!(!lit.is_empty() && lit.iter().all(|(x, y)| (10..18).contains(x) && (2..10).contains(y)), "{lit:?}");
-        assert_eq!(lit.iter().map(|(_, y)| *y).collect::<std::collections::BTreeSet<_>>().len(), 1, "a dash is a row");
-        write(&mut rgb, width, (36, 16), 2, [1.0; 3], "MM");
-    }
-}

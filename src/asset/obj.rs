@@ -1,4 +1,4 @@
-//! Wavefront OBJ: a checking reader around `tobj`, and a writer whose text reads back as the same bits.
+//! Wavefront OBJ: a checking reader around `tobj`.
 //!
 //! The reader accepts `v x y z [w | r g b]` (colours are linear emission), `vt u [v [w]]`, `vn`, and `f` with any number of
 //! corners, as `v`, `v/vt`, `v//vn` or `v/vt/vn`, counted from 1 or from the end (-1). Groups, objects, materials, points
@@ -230,41 +230,4 @@ fn index(word: &str, count: usize, total: usize, of: &str) -> std::result::Resul
         return Err(format!("{of} index {value} is out of range: the file has {total} ({count} up to here)"));
     }
     Ok(plain as usize)
-}
-
-/// The mesh as OBJ text, which reads back as the same bits, but for tints, which have no place in it. Equal normals are
-/// written once.
-pub fn write_obj(mesh: &Mesh) -> String {
-    let mut text =
-        format!("# {}: {} vertices, {} triangles, metres\n", mesh.name, mesh.positions.len(), mesh.triangles.len());
-    // Writing into a string cannot fail. Rust prints the shortest digits that read back as the same f32.
-    for (i, p) in mesh.positions.iter().enumerate() {
-        let _ = write!(text, "v {} {} {}", p.x, p.y, p.z);
-        if let Some(colors) = &mesh.colors {
-            let _ = write!(text, " {} {} {}", colors[i].x, colors[i].y, colors[i].z);
-        }
-        text += "\n";
-    }
-    let mut numbers = HashMap::new();
-    let mut normal_of = Vec::with_capacity(mesh.normals.len());
-    for n in &mesh.normals {
-        let next = numbers.len() + 1;
-        let number = *numbers.entry(n.to_array().map(f32::to_bits)).or_insert(next);
-        if number == next {
-            let _ = writeln!(text, "vn {} {} {}", n.x, n.y, n.z);
-        }
-        normal_of.push(number);
-    }
-    for uv in mesh.uvs.iter().flatten() {
-        let _ = writeln!(text, "vt {} {}", uv.x, uv.y);
-    }
-    for t in &mesh.triangles {
-        text += "f";
-        for &i in t {
-            let uv = if mesh.uvs.is_some() { (i + 1).to_string() } else { String::new() };
-            let _ = write!(text, " {}/{uv}/{}", i + 1, normal_of[i as usize]);
-        }
-        text += "\n";
-    }
-    text
 }

@@ -82,7 +82,6 @@ impl Sky {
 
 #[derive(Clone, Debug)]
 pub struct Dome {
-    /// Direction to the sun, unit.
     sun: DVec3,
     sun_half_angle_rad: f64,
     /// Linear RGB radiance of the sun's disc.
@@ -150,7 +149,6 @@ impl Dome {
         Disc { name: "sun of the sky", toward, half_angle_rad, radiance }
     }
 
-    /// Direction to the sun, unit.
     pub fn sun(&self) -> DVec3 {
         self.sun
     }

@@ -48,11 +48,9 @@ impl Wrap {
     }
 }
 
-/// Linear values of all bytes of sRGB.
 static LINEAR: LazyLock<[f32; 256]> =
     LazyLock::new(|| std::array::from_fn(|byte| linear_from_srgb(byte as f32 / 255.0)));
 
-/// The first bytes of a KTX2 file.
 pub const KTX2: &[u8] = b"\xABKTX 20\xBB\r\n\x1A\n";
 
 /// Texels of 8 bits, sRGB and alpha; rows from the top.
@@ -82,7 +80,6 @@ impl Texels {
         Ok(Texels { width: picture.width() as usize, height: picture.height() as usize, rgba })
     }
 
-    /// The largest level of a KTX2 file.
     #[cfg(feature = "decoders")]
     fn transcode(bytes: &[u8]) -> Result<Self> {
         use basisu::{DecodeFlags, TargetFormat, Transcoder};
@@ -117,7 +114,6 @@ impl Texels {
         self.rgba[y * self.width + x]
     }
 
-    /// The linear colour and alpha at texture coordinates.
     pub fn at(&self, uv: Vec2, wrap: [Wrap; 2]) -> Vec4 {
         linear(&self.texel(uv, wrap))
     }
@@ -193,7 +189,6 @@ impl Texels {
     }
 }
 
-/// Linear colour and alpha of a texel.
 fn linear([r, g, b, a]: &[u8; 4]) -> Vec4 {
     Vec3::from_array([r, g, b].map(|byte| LINEAR[usize::from(*byte)])).extend(f32::from(*a) / 255.0)
 }
@@ -242,7 +237,6 @@ impl Texture {
         self.mean_of(mesh, |corners, weights| Vec3::splat(self.opacity_at(mesh, corners, weights))).x.min(1.0)
     }
 
-    /// The mean reflectance of a mesh's surface.
     pub fn mean(&self, mesh: &Mesh) -> Vec3 {
         let blended = |corners, weights| if self.alpha_blend { self.opacity_at(mesh, corners, weights) } else { 1.0 };
         let mean = self.mean_of(mesh, |corners, weights| blended(corners, weights) * self.at(mesh, corners, weights));
@@ -330,16 +324,5 @@ mod tests {
         assert_eq!(texels.halved().rgba, [[188, 188, 188, 255]]);
         let cut = Texels { width: 2, height: 1, rgba: vec![[255; 4], [0, 0, 0, 0]] };
         assert_eq!(cut.halved().rgba, [[255, 255, 255, 128]]);
-    }
-
-    #[test]
-    fn middles_cover_a_triangle_evenly() {
-        for cuts in 1..5 {
-            let all: Vec<[f32; 3]> = middles(cuts).collect();
-            assert_eq!(all.len(), cuts * cuts);
-            let mean = all.iter().map(|m| Vec3::from_array(*m)).sum::<Vec3>() / all.len() as f32;
-            assert!((mean - Vec3::splat(1.0 / 3.0)).abs().max_element() < 1e-6, "{mean}");
-            assert!(all.iter().flatten().all(|w| *w > 0.0));
-        }
     }
 }

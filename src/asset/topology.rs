@@ -17,7 +17,6 @@ pub struct Topology {
     pub convex: bool,
     /// Unit normal of the plane in which all vertices lie, if they do.
     pub plane: Option<DVec3>,
-    /// Vertices - edges + triangles.
     pub euler_characteristic: i64,
 }
 
@@ -122,7 +121,6 @@ fn fan_count(edges: &[&[HalfEdge]], corner_count: usize) -> usize {
     sets.count
 }
 
-/// Connected components of the triangles.
 fn pieces(edges: &[&[HalfEdge]], triangle_count: usize) -> Sets {
     let mut sets = Sets::new(triangle_count);
     for pair in edges.iter().flat_map(|edge| edge.windows(2)) {

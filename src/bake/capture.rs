@@ -27,7 +27,6 @@ use std::sync::Arc;
 const ATLAS_PX: u32 = 2048;
 /// Nearest distance that a drawn radiance capture sees, in r.
 const NEAR: f32 = 1e-4;
-/// The slot of a face that is not in the atlas.
 pub const NO_SLOT: u32 = u32::MAX;
 
 #[repr(C)]
@@ -62,25 +61,17 @@ enum Writer {
     Computed(Raster),
 }
 
-/// What the faces of a batch show on the device.
-enum Shown {
-    /// Gathered indices; `None` where those of the model are drawn.
-    Drawn(Option<Buffer>),
-    Computed(RasterFaces),
-}
-
+/// What the faces of a batch show.
 pub struct Drawn {
     faces: Vec<DrawnFace>,
-    shown: Shown,
+    /// Indices of faces that are drawn, where they are not those of the model.
+    gathered: Option<Buffer>,
+    computed: Option<RasterFaces>,
 }
 
 impl Drawn {
-    pub fn access(&self) -> Access {
-        if matches!(self.shown, Shown::Computed(_)) { Access::TransferWrite } else { Access::ColorWrite }
-    }
-
-    fn gathered(&self) -> Option<&Buffer> {
-        if let Shown::Drawn(gathered) = &self.shown { gathered.as_ref() } else { None }
+    fn access(&self) -> Access {
+        if self.computed.is_some() { Access::TransferWrite } else { Access::ColorWrite }
     }
 
     /// Triangles that are drawn, each as often as faces show it.
@@ -95,19 +86,16 @@ pub struct Capture {
     /// Captured faces, row by row.
     pub atlas: Image,
     pub face_px: u32,
-    /// Faces in a row of the atlas.
     pub columns: u32,
     pub kind: FieldKind,
 }
 
 impl Capture {
-    /// The rows of the shader table: vertex and fragment.
     pub fn rows(kind: FieldKind) -> [ShaderPermutation; 2] {
         ["capture.vert", "capture.frag"]
             .map(|file| ShaderPermutation::new(file, 4).define("RADIANCE", kind == FieldKind::Radiance))
     }
 
-    /// Faces in a row of the atlas.
     fn columns(device: &Device, face_px: u32, kind: FieldKind) -> u32 {
         let atlas_px = ATLAS_PX.min(device.most_image_px());
         // The texels of a radiance capture are 16 times as large. Six faces always fit.
@@ -199,16 +187,11 @@ impl Capture {
             in_atlas.map(face).collect()
         };
         let mut faces: Vec<_> = eyes.par_iter().zip(slots).map_init(Vec::new, shown).flatten_iter().collect();
-        match &self.writer {
-            Writer::Computed(_) => {
-                let raster = RasterFaces::new(self.model.positions.device(), &faces)?;
-                Ok(Drawn { faces, shown: Shown::Computed(raster) })
-            }
-            Writer::Drawn { .. } => {
-                let gathered = self.model.gather(&mut faces)?;
-                Ok(Drawn { faces, shown: Shown::Drawn(gathered) })
-            }
-        }
+        let (gathered, computed) = match &self.writer {
+            Writer::Computed(_) => (None, Some(RasterFaces::new(self.model.positions.device(), &faces)?)),
+            Writer::Drawn { .. } => (self.model.gather(&mut faces)?, None),
+        };
+        Ok(Drawn { faces, gathered, computed })
     }
 
     /// Captures what was chosen, and records the barriers around it up to the one for `reader`, which reads the atlas
@@ -218,9 +201,9 @@ impl Capture {
         if let Writer::Drawn { depth: Some(depth), .. } = &self.writer {
             commands.image_barrier(depth, None, Access::DepthWrite);
         }
-        commands.pass("capture", |c| match (&self.writer, &drawn.shown) {
-            (Writer::Computed(raster), Shown::Computed(faces)) => raster.record(c, &self.model, faces, &self.atlas),
-            (Writer::Drawn { pipeline, depth }, Shown::Drawn(_)) => self.draw(c, pipeline, depth.as_ref(), drawn),
+        commands.pass("capture", |c| match (&self.writer, &drawn.computed) {
+            (Writer::Computed(raster), Some(faces)) => raster.record(c, &self.model, faces, &self.atlas),
+            (Writer::Drawn { pipeline, depth }, None) => self.draw(c, pipeline, depth.as_ref(), drawn),
             _ => unreachable!("what was chosen is for another capture"),
         })?;
         commands.image_barrier(&self.atlas, Some(drawn.access()), reader);
@@ -240,7 +223,7 @@ impl Capture {
         let mut vertices = vec![(&self.model.positions, 0)];
         vertices.extend(self.model.colors.iter().filter(|_| radiance).map(|colors| (colors, 0)));
         commands.render(&target, |drawing| {
-            drawing.bind(pipeline, &vertices, drawn.gathered().unwrap_or(&self.model.indices));
+            drawing.bind(pipeline, &vertices, drawn.gathered.as_ref().unwrap_or(&self.model.indices));
             if self.model.closed {
                 // A cube face is a mirror image, which turns every triangle over: these are the object's back faces.
                 drawing.cull(vk::CullModeFlags::FRONT);

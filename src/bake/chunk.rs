@@ -23,7 +23,6 @@ pub(super) struct Chunk {
 }
 
 impl Chunk {
-    /// The chunk of triangles that are given by their corners.
     fn new(indices: Range<u32>, triangles: &[[Vec3; 3]]) -> Self {
         let corners = || triangles.iter().flatten();
         let (low, high) = corners().fold((Vec3::MAX, Vec3::MIN), |(l, h), p| (l.min(*p), h.max(*p)));

@@ -1,9 +1,9 @@
 //! Bakes or finds in the cache every field and transfer vector that a scene needs. Everything that shows a scene calls
 //! [`ensure()`].
 
-use super::cache::{Cache, CacheAnswer, field_name};
+use super::cache::{Cache, field_name};
 use super::surfaces::{BakedSurface, SurfacePlan};
-use super::{BakeReport, Baker, Options, Progress, Wanted, header};
+use super::{BakeReport, Baker, Options, Wanted, header};
 use crate::asset::Mesh;
 use crate::error::Result;
 use crate::field::lamp_colors::LampColors;
@@ -16,7 +16,6 @@ use crate::scene::Scene;
 use crate::scene::groups::Groups;
 use crate::scene::light::{self, LightMethod, Lights};
 use std::collections::{HashMap, HashSet};
-use std::hash::Hash;
 use std::sync::Arc;
 
 /// A function that is told the name of what is being baked, the samples that are done, and the samples in all.
@@ -26,7 +25,6 @@ pub type SceneProgress<'p> = &'p dyn Fn(&str, u32, u32);
 pub struct Baked {
     /// Name of the mesh, and the kind of field.
     pub what: String,
-    /// What the bake did, and where its time went.
     pub report: BakeReport,
 }
 
@@ -39,7 +37,6 @@ pub struct BakedMesh {
     pub lamp_colors: Option<Arc<LampColors>>,
 }
 
-/// Everything that is baked of a scene.
 pub struct BakedScene {
     pub meshes: Vec<BakedMesh>,
     pub surfaces: Vec<BakedSurface>,
@@ -92,7 +89,7 @@ impl SceneNeeds {
         let headers = self.meshes.iter().flat_map(|(_, headers)| headers).flatten();
         let distinct = headers.filter(|header| known.insert(field_name(header)));
         let fields: u64 = distinct.map(|header| header.payload_bytes().next_multiple_of(alignment)).sum();
-        let node_bytes = channel_stride(self.options.occlusion_bands()) * self.options.storage.bytes();
+        let node_bytes = channel_stride(self.options.bands) * self.options.storage.bytes();
         let volumes = self.surfaces.groups.iter().filter_map(|group| group.volume.as_ref());
         fields + volumes.map(|volume| (volume.nodes.count() * node_bytes) as u64).sum::<u64>()
     }
@@ -112,10 +109,7 @@ impl SceneNeeds {
                 missing.push((field_title(mesh, header), header.lattice.sample_count()));
             }
             if needed.silhouette && !cache.has_silhouette(mesh, &self.options) {
-                missing.push((
-                    format!("{} silhouette", mesh.name),
-                    NodeGrid::map_count(self.options.silhouette.cells) as u32,
-                ));
+                missing.push((silhouette_title(mesh), NodeGrid::map_count(self.options.silhouette.cells) as u32));
             }
         }
         for group in self.surfaces.groups.iter().filter(|group| !cache.has_surfaces(group)) {
@@ -137,10 +131,12 @@ fn field_title(mesh: &Mesh, header: &FieldHeader) -> String {
     format!("{} {word}", mesh.name)
 }
 
-/// What the entities of a mesh need to have baked.
+fn silhouette_title(mesh: &Mesh) -> String {
+    format!("{} silhouette", mesh.name)
+}
+
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Needed {
-    /// Occlusion and radiance field.
     pub fields: [Option<FieldKind>; 2],
     pub silhouette: bool,
     pub lamp_colors: bool,
@@ -178,33 +174,6 @@ pub fn bakes_transfer(mesh: &Mesh) -> bool {
     !mesh.is_flat() && !mesh.is_convex()
 }
 
-/// What a scene has so far. Meshes that are equal under two names share it.
-struct Making<'m> {
-    progress: SceneProgress<'m>,
-    baked: Vec<Baked>,
-    fields: HashMap<String, Arc<ShadowField>>,
-    silhouettes: HashMap<[u8; 32], Arc<SilhouetteField>>,
-}
-
-impl Making<'_> {
-    /// What is known under a key, or what `find` bakes or finds in the cache, under the name `what`.
-    fn once<K: Eq + Hash, T>(
-        &mut self,
-        known: fn(&mut Self) -> &mut HashMap<K, Arc<T>>,
-        key: K,
-        what: String,
-        find: impl FnOnce(Progress<'_>) -> Result<CacheAnswer<T>>,
-    ) -> Result<Arc<T>> {
-        if let Some(found) = known(self).get(&key) {
-            return Ok(found.clone());
-        }
-        let (found, report) = find(&|now, all| (self.progress)(&what, now, all))?;
-        self.baked.extend(report.map(|report| Baked { what, report }));
-        known(self).insert(key, found.clone());
-        Ok(found)
-    }
-}
-
 /// Bakes or finds in the cache every field and transfer of `needs`, which are those of `scene`, mesh by mesh. What is
 /// baked is kept in the cache.
 pub fn ensure(
@@ -214,22 +183,38 @@ pub fn ensure(
     needs: &SceneNeeds,
     progress: SceneProgress<'_>,
 ) -> Result<BakedScene> {
-    let mut making = Making { progress, baked: Vec::new(), fields: HashMap::new(), silhouettes: HashMap::new() };
     let options = &needs.options;
+    let mut baked = Vec::new();
+    let mut note = |what: &str, report: Option<BakeReport>| {
+        baked.extend(report.map(|report| Baked { what: what.to_owned(), report }));
+    };
+    // Equal meshes of two names share fields, which are looked for once.
+    let mut fields: HashMap<String, Arc<ShadowField>> = HashMap::new();
+    let mut silhouettes: HashMap<[u8; 32], Arc<SilhouetteField>> = HashMap::new();
     let mut meshes = Vec::with_capacity(scene.meshes.len());
     for (index, (needed, headers)) in needs.meshes.iter().enumerate() {
         let mesh = scene.caster(index);
         let mut to = BakedMesh::default();
         for (header, to) in headers.iter().zip([&mut to.blocked, &mut to.radiance]) {
             let Some(header) = header else { continue };
-            let find = |told: Progress<'_>| cache.field(baker, mesh, header, told);
-            let title = field_title(mesh, header);
-            *to = Some(making.once(|all| &mut all.fields, field_name(header), title, find)?);
+            let name = field_name(header);
+            if !fields.contains_key(&name) {
+                let what = field_title(mesh, header);
+                let (found, report) = cache.field(baker, mesh, header, &|now, all| progress(&what, now, all))?;
+                note(&what, report);
+                fields.insert(name.clone(), found);
+            }
+            *to = Some(fields[&name].clone());
         }
         if needed.silhouette {
-            let what = format!("{} silhouette", mesh.name);
-            let find = |told: Progress<'_>| cache.silhouette(baker, mesh, options, told);
-            to.silhouette = Some(making.once(|all| &mut all.silhouettes, mesh.content_hash(), what, find)?);
+            let hash = mesh.content_hash();
+            if !silhouettes.contains_key(&hash) {
+                let what = silhouette_title(mesh);
+                let (found, report) = cache.silhouette(baker, mesh, options, &|now, all| progress(&what, now, all))?;
+                note(&what, report);
+                silhouettes.insert(hash, found);
+            }
+            to.silhouette = Some(silhouettes[&hash].clone());
         }
         to.lamp_colors =
             needed.lamp_colors.then(|| Arc::new(LampColors::bake(&scene.meshes[index], options.silhouette.cells)));
@@ -244,7 +229,7 @@ pub fn ensure(
     for group in &needs.surfaces.groups {
         let what = group.title();
         let (found, report) = cache.surfaces(group, &|now, all| progress(&what, now, all));
-        making.baked.extend(report.map(|report| Baked { what, report }));
+        note(&what, report);
         for (place, &entity) in group.entities.iter().enumerate() {
             // Entities alone share the only surface of their group.
             let member = place.min(found.len() - 1);
@@ -258,9 +243,8 @@ pub fn ensure(
         }
         scene_surfaces.extend(found.iter().cloned());
         if let Some(plan) = &group.volume {
-            let what = VOLUME_TITLE.to_owned();
-            let (found, report) = cache.volume(group, plan, &|now, all| progress(&what, now, all));
-            making.baked.extend(report.map(|report| Baked { what, report }));
+            let (found, report) = cache.volume(group, plan, &|now, all| progress(VOLUME_TITLE, now, all));
+            note(VOLUME_TITLE, report);
             let mut has = vec![false; count];
             group.entities.iter().zip(group.occluders()).for_each(|(&entity, blocks)| has[entity] = blocks);
             volume = (!found.blocked.is_empty()).then_some(SceneVolume { volume: found, has });
@@ -268,5 +252,5 @@ pub fn ensure(
     }
     // What is held for further bakes is free for pictures.
     baker.rest();
-    Ok(BakedScene { meshes, surfaces: scene_surfaces, surface_of, near, rigid, volume, baked: making.baked })
+    Ok(BakedScene { meshes, surfaces: scene_surfaces, surface_of, near, rigid, volume, baked })
 }

@@ -61,7 +61,6 @@ pub(super) enum Tolerance {
 }
 
 impl Tolerance {
-    /// The tolerance of a capture with faces of `face_px`.
     pub fn capture(eye: Vec3, face_px: u32) -> Self {
         Tolerance::Eye(eye, (TEXEL_SHARE * 2.0) as f32 / face_px as f32)
     }
@@ -121,7 +120,6 @@ impl Levels {
     }
 }
 
-/// A mesh cut into the chunks of all of its levels.
 pub(super) struct Leveled {
     pub chunked: Chunked,
     pub levels: Levels,

@@ -5,7 +5,7 @@
 //! group -> refine -> rays -> surfaces with transfer vectors and self-visibility
 //! ```
 //!
-//! [`Baker::field`] goes along the first line; `batch.rs` records the passes from capture on, with every barrier.
+//! [`Baker::field`] goes along the first line, with every barrier.
 //! [`surfaces::GroupPlan::bake`] goes along the second, on the host. Silhouette fields have a pass of their own
 //! ([`silhouette`]).
 //!
@@ -16,7 +16,6 @@
 //! - A **level** is the mesh with fewer and larger triangles, for what is far from the eye.
 
 pub mod assemble;
-mod batch;
 pub mod cache;
 pub mod capture;
 pub mod chunk;
@@ -26,13 +25,11 @@ mod lamp_colors;
 pub mod levels;
 pub mod links;
 pub mod model;
-mod names;
 mod options;
 pub mod own_visibility;
 mod packet;
 mod polyhedron;
 pub mod project;
-mod quality;
 pub mod raster;
 mod refine;
 mod samples;
@@ -50,13 +47,14 @@ use crate::gpu::{Access, Buffer, BufferKind, Commands, Device, Timing};
 use crate::sh::polygon::POLYGON_BANDS;
 use crate::shaders::Library;
 use assemble::{Assemble, Sources};
-use batch::Batches;
+use capture::{Capture, NO_SLOT, Way};
 pub use ensure::{BakedMesh, BakedScene, SceneNeeds, bakes_transfer, ensure, needs};
+use glam::Vec3;
 use levels::Leveled;
 use model::Model;
-pub use options::{Options, Quality, first_shell, hash_text, header};
+pub use options::{BakeOptions, Options, Quality, first_shell, hash_text, header};
 use polyhedron::Polyhedron;
-pub use quality::BakeOptions;
+use project::{Project, SampleFaces};
 use samples::FieldSamples;
 use serde::Serialize;
 use std::sync::{Arc, Mutex, PoisonError};
@@ -85,13 +83,9 @@ pub struct BakeReport {
     pub faces: u32,
     /// Number of triangles that were drawn, each as often as faces showed it.
     pub triangles: u64,
-    /// Device time in capture passes, in ms.
     pub capture_ms: f64,
-    /// Device time in project passes, in ms.
     pub project_ms: f64,
-    /// Device time in the assemble pass, in ms.
     pub assemble_ms: f64,
-    /// Wall time of the whole bake.
     pub total: Duration,
 }
 
@@ -107,7 +101,6 @@ impl BakeReport {
     }
 }
 
-/// What is wanted of the vertices of a mesh.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Wanted {
     pub transfer: bool,
@@ -177,10 +170,6 @@ impl Baker {
         for (sample, captured) in captured.iter().zip(coefficients.chunks_exact(stride)) {
             values[sample.number as usize * stride..][..stride].copy_from_slice(captured);
         }
-        for sample in 0..header.lattice.sample_count() {
-            let first = samples::first_at_place(&header.lattice, sample) as usize * stride;
-            values.copy_within(first..first + stride, sample as usize * stride);
-        }
         header.captured_samples = captured.len() as u32;
         header.filled_samples = inside_count;
         let payload = self.assemble(&header, &values, &sources, &mut report)?;
@@ -191,7 +180,8 @@ impl Baker {
         Ok((field, report))
     }
 
-    /// The samples of a field and their coefficients, captured.
+    /// The samples of a field and their coefficients: captured and projected batch after batch, of which `progress`
+    /// hears.
     fn capture(
         &self,
         mesh: &Mesh,
@@ -209,8 +199,40 @@ impl Baker {
         // They take about equally long, each mostly on one thread, so they are made side by side.
         let (samples, model) = rayon::join(|| FieldSamples::new(mesh, &header.lattice), make_model);
         let samples = samples?;
-        let batches = Batches::new(&self.device, &self.library, model?, header)?;
-        let coefficients = batches.run(&samples.captured, report, progress)?;
+        let device = &self.device;
+        let capture = Capture::new(device, &self.library, model?, header.face_px, header.kind, Way::usual(device))?;
+        let project = Project::new(device, &self.library, header.bands, header.kind, header.face_px, capture.columns)?;
+        let most = capture.capacity() as usize;
+        let stride = header.sample_stride();
+        let bytes = |count: usize| 4 * (count * stride) as u64;
+        let face_bytes = (most * size_of::<SampleFaces>()) as u64;
+        let mut sample_faces = Buffer::new(device, "samples with faces", BufferKind::Upload, face_bytes)?;
+        let projected = Buffer::new(device, "batch samples", BufferKind::Device, bytes(most))?;
+        let results = Buffer::new(device, "batch results", BufferKind::Readback, bytes(most))?;
+
+        let eyes: Vec<Vec3> = samples.captured.iter().map(|sample| sample.eye).collect();
+        let mut coefficients = Vec::new();
+        let mut done = 0;
+        for slots in capture.plan(&eyes) {
+            let count = slots.len();
+            let batch = done..done + count;
+            done = batch.end;
+            let drawn = capture.choose(&eyes[batch.clone()], &slots)?;
+            let faces = samples.captured[batch].iter().zip(&slots);
+            let faces = faces.map(|(sample, slots)| SampleFaces { slots: *slots, scale: sample.scale });
+            sample_faces.write(0, &faces.collect::<Vec<_>>());
+            let mut commands = Commands::new(device, "bake batch")?;
+            capture.record(&mut commands, &drawn, Access::ComputeSampled)?;
+            commands.pass("project", |c| project.record(c, &capture.atlas, &sample_faces, &projected, count as u32))?;
+            commands.barrier(Access::ComputeWrite, Access::TransferRead);
+            commands.copy_range(&projected, 0..bytes(count), &results, 0);
+            commands.barrier(Access::TransferWrite, Access::HostRead);
+            report.add(&commands.submit()?);
+            report.faces += slots.iter().flatten().filter(|slot| **slot != NO_SLOT).count() as u32;
+            report.triangles += drawn.triangles();
+            coefficients.extend(results.read::<f32>(0, count * stride));
+            progress(done as u32, samples.captured.len() as u32);
+        }
         Ok((samples, coefficients))
     }
 
@@ -253,7 +275,6 @@ impl Baker {
         Ok(leveled)
     }
 
-    /// Gives back what is kept of the last mesh.
     fn rest(&self) {
         *self.leveled.lock().unwrap_or_else(PoisonError::into_inner) = None;
     }

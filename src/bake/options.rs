@@ -9,6 +9,7 @@ use super::surface::depth_at_origin;
 use super::triangles::unit_positions;
 use crate::asset::mesh::Mesh;
 use crate::asset::topology::volume_m3;
+use crate::error::{Error, Result};
 use crate::field::lattice::{OUTSIDE_INNER, ROOMY_INNER};
 use crate::field::quantity::{FieldKind, Storage};
 use crate::field::{FieldHeader, Fit, Lattice};
@@ -19,14 +20,10 @@ use serde::{Deserialize, Serialize};
 /// a field.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Options {
-    /// SH bands of transfers and radiance fields.
     pub bands: usize,
-    /// SH bands of occlusion fields; `None` means as many as `bands`.
-    pub field_bands: Option<usize>,
     pub storage: Storage,
     /// Sample points. The first shell may be left to the bake.
     pub lattice: Lattice,
-    /// Edge of a captured face in texels.
     pub face_px: u32,
     pub silhouette: SilhouetteOptions,
     /// Vertices to which the surfaces of a scene may be refined where light varies; 0 leaves meshes as they are.
@@ -45,7 +42,6 @@ impl Default for Options {
     fn default() -> Self {
         Options {
             bands: 4,
-            field_bands: None,
             storage: Storage::default(),
             lattice: Lattice::default(),
             face_px: 64,
@@ -58,18 +54,9 @@ impl Default for Options {
 }
 
 impl Options {
-    pub fn occlusion_bands(&self) -> usize {
-        self.field_bands.unwrap_or(self.bands)
-    }
-
     /// The share of a texel by which captures of a mesh without colours may miss it.
     pub(super) fn level_texels(&self, mesh: &Mesh) -> f64 {
         if self.levels { levels::texels(mesh) } else { 0.0 }
-    }
-
-    /// SH bands of the kind of field that has the most.
-    pub fn most_bands(&self) -> usize {
-        self.bands.max(self.occlusion_bands())
     }
 }
 
@@ -113,7 +100,7 @@ pub fn header(mesh: &Mesh, kind: FieldKind, options: &Options) -> FieldHeader {
     let brightest = mesh.colors.iter().flatten().map(|c| c.max_element()).fold(0.0, f32::max);
     FieldHeader {
         kind,
-        bands: if kind == FieldKind::Occlusion { options.occlusion_bands() } else { options.bands },
+        bands: options.bands,
         storage: options.storage,
         lattice,
         face_px: options.face_px,
@@ -166,5 +153,100 @@ impl Quality {
                 ..normal
             },
         }
+    }
+}
+
+/// What decides a bake: a quality, and what overrides parts of it.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "cli", derive(clap::Args), command(next_help_heading = "Baking"))]
+pub struct BakeOptions {
+    /// How finely fields are sampled and stored
+    #[cfg_attr(feature = "cli", arg(long, value_enum, default_value = "normal", value_name = "QUALITY"))]
+    pub quality: Quality,
+    /// Sample points in place of the quality's: cube:SHELLSxCELLS, with an odd number of cells. Words may follow after
+    /// commas: inner=R, outer=R (in bounding radii), edges (samples on the edges of cube faces: finer steps in as many
+    /// bytes, not for boxes), edges=auto (the mesh decides). Example: cube:20x7,edges=auto
+    #[cfg_attr(feature = "cli", arg(long, value_name = "LATTICE"))]
+    pub lattice: Option<Lattice>,
+    /// Edge of a captured cube face in texels, in place of the quality's
+    #[cfg_attr(feature = "cli", arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(4..=1024)))]
+    pub face_px: Option<u32>,
+    /// SH bands of light, transfer and what is stored, 2 to 7, in place of the quality's; N bands are N*N coefficients
+    #[cfg_attr(feature = "cli", arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(2..=7)))]
+    pub bands: Option<u32>,
+    /// Number format of stored coefficients
+    #[cfg_attr(feature = "cli", arg(long, value_name = "f16|f32"))]
+    pub storage: Option<Storage>,
+}
+
+impl From<Quality> for BakeOptions {
+    fn from(quality: Quality) -> Self {
+        BakeOptions { quality, ..Default::default() }
+    }
+}
+
+impl BakeOptions {
+    /// What the bake does: the quality, and what is said of each part.
+    ///
+    /// # Errors
+    /// `Input` where a number is out of its range.
+    pub fn resolve(self) -> Result<Options> {
+        let of_quality = self.quality.options();
+        if self.bands.is_some_and(|bands| !(2..=7).contains(&bands)) {
+            return Err(Error::Input("expected 2 to 7 bands".into()));
+        }
+        let face_px = self.face_px.unwrap_or(of_quality.face_px);
+        if !(4..=1024).contains(&face_px) {
+            return Err(Error::Input(format!("expected faces of 4 to 1024 px, got {face_px}")));
+        }
+        Ok(Options {
+            lattice: self.lattice.unwrap_or(of_quality.lattice),
+            face_px,
+            bands: self.bands.map_or(of_quality.bands, |bands| bands as usize),
+            storage: self.storage.unwrap_or(of_quality.storage),
+            ..of_quality
+        })
+    }
+}
+
+#[cfg(all(test, feature = "cli"))]
+mod tests {
+    use super::*;
+    use clap::{Parser, ValueEnum};
+
+    #[derive(Parser)]
+    struct CommandLine {
+        #[command(flatten)]
+        bake: BakeOptions,
+    }
+
+    fn parsed(words: &[&str]) -> Options {
+        CommandLine::try_parse_from([&["line"], words].concat()).unwrap().bake.resolve().unwrap()
+    }
+
+    #[test]
+    fn every_quality_is_a_row_of_options() {
+        assert_eq!(parsed(&[]), Quality::Normal.options());
+        let all: Vec<Options> = ["draft", "normal", "high"].map(|word| parsed(&["--quality", word])).to_vec();
+        assert_eq!(all, Quality::value_variants().iter().map(|quality| quality.options()).collect::<Vec<_>>());
+        assert_eq!(all[1], parsed(&[]), "normal is what there is without the option");
+        assert_eq!("cube:20x7,edges=auto".parse(), Ok(Lattice::default()), "as help texts write it");
+        for pair in all.windows(2) {
+            let samples = pair.iter().map(|o| o.lattice.stored_count()).collect::<Vec<_>>();
+            assert!(pair[0].face_px < pair[1].face_px && pair[0].bands < pair[1].bands && samples[0] < samples[1]);
+        }
+    }
+
+    #[test]
+    fn a_single_switch_overrides_the_quality() {
+        let high = Quality::High.options();
+        for words in [&["--quality", "high", "--bands", "4"], &["--bands", "4", "--quality", "high"]] {
+            assert_eq!(parsed(words), Options { bands: 4, ..high });
+        }
+        let lattice = "cube:9x5".parse().unwrap();
+        assert_eq!(
+            parsed(&["--quality=draft", "--lattice=cube:9x5", "--face-px=40", "--storage=f32"]),
+            Options { lattice, face_px: 40, storage: Storage::F32, ..Quality::Draft.options() }
+        );
     }
 }

@@ -5,11 +5,10 @@
 //! radiance.
 
 use super::capture::Slots;
-use super::samples::Sample;
 use crate::error::{Error, Result};
 use crate::field::quantity::{FieldKind, channel_stride};
 use crate::gpu::memory::TexelView;
-use crate::gpu::{Bind, Buffer, BufferKind, Commands, ComputePipeline, Device, Image};
+use crate::gpu::{Bind, Buffer, Commands, ComputePipeline, Device, Image};
 use crate::sh;
 use crate::sh::basis::coefficient_count;
 use crate::sh::cube::{solid_angle, texel_st};
@@ -25,12 +24,6 @@ pub struct SampleFaces {
     pub slots: Slots,
     /// Factor on coefficients.
     pub scale: f32,
-}
-
-impl SampleFaces {
-    pub(super) fn new(sample: &Sample, slots: Slots) -> Self {
-        SampleFaces { slots, scale: sample.scale }
-    }
 }
 
 /// Bytes of shared memory that every device has (Vulkan 1.3, "Required Limits": maxComputeSharedMemorySize).
@@ -67,7 +60,6 @@ impl Project {
             .define("WORKGROUP", workgroup(bands, kind))
     }
 
-    /// A pipeline for faces of `face_px` in an atlas of `columns`.
     pub fn new(
         device: &Arc<Device>,
         library: &Library,
@@ -86,12 +78,6 @@ impl Project {
             )));
         }
         Ok(Project { pipeline, texels, bands, kind, face_px, columns })
-    }
-
-    /// Room for `count` samples that the host writes.
-    pub fn sample_buffer(device: &Arc<Device>, count: u32) -> Result<Buffer> {
-        let bytes = u64::from(count) * size_of::<SampleFaces>() as u64;
-        Buffer::new(device, "samples with faces", BufferKind::Upload, bytes)
     }
 
     pub fn record<'r>(

@@ -30,16 +30,12 @@ const INDEX_FORMAT: vk::Format = vk::Format::R32_UINT;
 pub struct Face {
     /// Place of the eye, in r.
     pub eye: [f32; 4],
-    /// Axis of the columns.
     pub right: [f32; 4],
-    /// Axis of the rows.
     pub down: [f32; 4],
-    /// Axis of the view.
     pub forward: [f32; 4],
     pub slot: u32,
     pub range_first: u32,
     pub range_count: u32,
-    /// Fills the struct up to a multiple of 16 bytes.
     pub unused: u32,
 }
 
@@ -107,7 +103,6 @@ impl Raster {
         face_px.is_multiple_of(4) && face_px <= WORDS
     }
 
-    /// Whether the device's texel views hold a model.
     pub(super) fn holds(device: &Device, model: &Model) -> bool {
         TexelView::fits(device, POSITION_FORMAT, model.positions.size_bytes)
             && TexelView::fits(device, INDEX_FORMAT, model.indices.size_bytes)

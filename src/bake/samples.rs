@@ -10,11 +10,9 @@ use glam::{DVec3, Vec3};
 
 #[derive(Clone, Copy)]
 pub(super) struct Sample {
-    /// Its number among all samples of the lattice.
     pub number: u32,
     /// From where it is captured, in r.
     pub eye: Vec3,
-    /// Factor on its coefficients.
     pub scale: f32,
 }
 
@@ -54,8 +52,8 @@ impl FieldSamples {
 }
 
 /// The first sample at the place of this one. Samples on an edge between faces of the lattice's cube have several
-/// numbers.
-pub(super) fn first_at_place(lattice: &Lattice, sample: u32) -> u32 {
+/// numbers, of which the first alone is captured and assembled.
+fn first_at_place(lattice: &Lattice, sample: u32) -> u32 {
     let count = lattice.direction_count();
     sample / count * count + lattice.first_of(sample % count)
 }

@@ -153,7 +153,7 @@ impl SurfacePlan {
             let moved = plan.moved_among(scene);
             let volume = moved.and_then(|(wanted, radius_m)| {
                 let name = plan.key.clone().unwrap_or_else(|| plan.name());
-                VolumePlan::new(&name, wanted, radius_m, options.occlusion_bands())
+                VolumePlan::new(&name, wanted, radius_m, options.bands)
             });
             plans.push(GroupPlan { volume, ..plan });
         }

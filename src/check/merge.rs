@@ -161,8 +161,6 @@ pub fn rows(baker: &Baker, add: &mut dyn FnMut(CheckRow)) -> Result<()> {
     for name in ["cones", "horizon", "caps"] {
         compare(format!("without {name}"), frame::Options { skip: Skip::without(name), ..base })?;
     }
-    let bake = bake::Options { field_bands: Some(6), ..base.bake };
-    compare("6 bands of visibility".into(), frame::Options { bake, ..base })?;
     for lattice in LATTICES {
         let bake = bake::Options { lattice: lattice.parse().expect("a lattice in the table"), ..base.bake };
         compare(lattice.into(), frame::Options { bake, ..base })?;

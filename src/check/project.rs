@@ -74,8 +74,7 @@ impl<'b> Content<'b> {
         let stride = project.kind.channels() * channel_stride(project.bands);
         let coefficients = Buffer::with_data(device, "coefficients", &vec![SENTINEL; samples.len() * stride])?;
         let count = samples.len() as u32;
-        let mut uploaded = Project::sample_buffer(device, count)?;
-        uploaded.write(0, samples);
+        let uploaded = Buffer::with_data(device, "samples with faces", samples)?;
         let mut commands = Commands::new(device, "check of captured faces")?;
         self.capture.record(&mut commands, &self.drawn, Access::ComputeSampled)?;
         let atlas = &self.capture.atlas;

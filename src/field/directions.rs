@@ -52,7 +52,6 @@ impl Lattice {
         self.edges == Some(true)
     }
 
-    /// Captured directions along a row of a cube's face.
     fn columns(&self) -> u32 {
         if self.has_edges() { self.cells + 2 } else { self.cells }
     }
@@ -119,7 +118,6 @@ impl Lattice {
         self.first_of((other as u32 * columns + y) * columns + x)
     }
 
-    /// Number of stored directions of one shell, including borders.
     pub fn stored_direction_count(&self) -> u32 {
         6 * (self.cells + 2) * (self.cells + 2)
     }

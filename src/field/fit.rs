@@ -27,7 +27,6 @@ impl Fit {
     /// No fit: spherical shells about the bounding sphere's centre.
     pub const ROUND: Fit = Fit { centre: [0.0; 3], stretch: [1.0; 3] };
 
-    /// Largest factor of an axis.
     pub const MOST: f64 = 2.0;
 
     /// The fit of a mesh, whose positions are in r from the bounding sphere's centre: the middle of its box, and the

@@ -2,7 +2,6 @@
 
 pub mod area;
 mod directions;
-pub mod extent;
 pub mod file;
 pub mod fit;
 pub mod lamp_colors;
@@ -14,7 +13,6 @@ pub mod silhouette;
 pub mod silhouette_header;
 pub mod silhouette_nodes;
 pub mod sub_light;
-mod text;
 pub mod visibility_volume;
 
 pub use area::Area;
@@ -51,7 +49,6 @@ pub struct FieldHeader {
     /// Radiance fields: factor on the stored coefficients, so that f16 can represent any brightness. Occlusion fields:
     /// 1.
     pub radiance_scale: f32,
-    /// Name of the mesh, for messages.
     pub mesh: String,
     /// Content hash of the mesh, hexadecimal.
     pub mesh_hash: String,
@@ -68,7 +65,6 @@ impl FieldHeader {
         quantity::channel_stride(self.bands)
     }
 
-    /// Coefficients of one sample as stored.
     pub fn sample_stride(&self) -> usize {
         self.kind.channels() * self.channel_stride()
     }
@@ -118,6 +114,13 @@ impl ShadowField {
             }
         };
         raw * f64::from(header.radiance_scale)
+    }
+
+    /// Whether every stored number is zero: its object blocks or emits nothing.
+    pub fn is_empty(&self) -> bool {
+        let numbers = self.header.sample_stride();
+        (0..self.header.lattice.stored_count())
+            .all(|sample| (0..numbers).all(|number| self.stored(sample, 0, number) == 0.0))
     }
 
     /// The same field in floats, which hold every half exactly and are read sooner.

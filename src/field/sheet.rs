@@ -51,7 +51,6 @@ impl Rectangle {
     }
 }
 
-/// A rectangle in the world.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Sheet {
     pub centre: DVec3,
@@ -63,7 +62,6 @@ pub struct Sheet {
 pub struct SheetEye {
     pub position: DVec3,
     pub normal: DVec3,
-    /// Centre and radius of the receiver's bounding sphere.
     pub receiver: (DVec3, f64),
 }
 
@@ -117,7 +115,6 @@ impl SheetView {
         DVec3::new(x, y, self.height).length()
     }
 
-    /// What it blocks, in four bands.
     pub fn blocked(&self) -> [f64; POLYGON_COEFFICIENTS] {
         polygon(&self.corners())
     }

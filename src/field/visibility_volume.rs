@@ -9,7 +9,6 @@ use glam::{DVec3, UVec3, Vec3};
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 
-/// Where the nodes of a volume stand.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct NodeBox {
     /// The first node in the world, metres.

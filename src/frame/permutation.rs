@@ -101,7 +101,6 @@ pub(super) fn permutation(
     MergePermutation {
         variant,
         bands: options.bake.bands,
-        field_bands: options.bake.occlusion_bands(),
         storage: options.bake.storage,
         lattice: options.bake.lattice,
         skip: options.skip,

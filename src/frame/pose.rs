@@ -1,7 +1,6 @@
 //! What an entity is to the merge at one time: its place, rotation and light; and the clusters of a receiver.
 
 use super::Frame;
-use crate::field::extent::Extent;
 use crate::field::quantity::channel_stride;
 use crate::field::self_visibility;
 use crate::field::sheet::{Rectangle, Sheet};
@@ -55,17 +54,11 @@ impl Frame {
         let entity = &self.scene.entities[index];
         let device_mesh = &self.buffers.meshes[entity.mesh];
         // A field that nobody needs was not baked, and one of zeros changes nothing.
-        let holds = |slot: &Option<FieldSlot>| slot.as_ref().is_some_and(|slot| slot.extent != Extent::Nothing);
+        let holds = |slot: &Option<FieldSlot>| slot.as_ref().is_some_and(|slot| !slot.is_empty);
         let sharp = entity.emits && self.light_method(index).is_sharp();
         let coloured = device_mesh.radiance.is_some() && entity.emits && !sharp;
         let source = if coloured { &device_mesh.radiance } else { &device_mesh.blocked };
-        let rotation = placement.turn();
-        let of_field = source.as_ref().filter(|_| !sharp).and_then(|slot| match slot.extent {
-            Extent::Cone { axis, half_angle_rad } => Some((rotation * axis, half_angle_rad)),
-            Extent::Nothing | Extent::All => None,
-        });
-        let of_spot = entity.spot.map(|spot| (rotation * DVec3::Y, f64::from(spot.outer_deg).to_radians()));
-        let facing = of_spot.or(of_field);
+        let facing = entity.spot.map(|spot| (placement.turn() * DVec3::Y, f64::from(spot.outer_deg).to_radians()));
         let brightest = device_mesh.radiance.as_ref().filter(|_| coloured).map_or(1.0, |s| s.header.radiance_scale);
         EntityBounds {
             centre: self.centre(index, placement),

@@ -81,7 +81,7 @@ pub struct EntityBounds {
     pub coloured: bool,
     /// Largest radiance that it shines with, of any colour.
     pub radiance: f64,
-    /// Axis (world) and half-angle of a cone of directions outside of which its radiance field is zero.
+    /// Axis (world) and half-angle of the cone that it shines into, if it is a spot.
     pub facing: Option<(DVec3, f64)>,
     /// The rectangle by which it casts shadows.
     pub sheet: Option<Sheet>,
@@ -100,8 +100,8 @@ pub struct OutlineView {
 /// A light as the gather sees it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ListLight {
-    /// Axis (world) and cosine of the half-angle, with `CONE_ROUNDING_RAD`, of a cone of directions outside of which
-    /// its radiance field is zero; cosine -2 where it shines all round.
+    /// Axis (world) and cosine of the half-angle, with `CONE_ROUNDING_RAD`, of the cone of a spot; cosine -2 where it
+    /// shines all round.
     pub facing: [f32; 4],
     /// Largest radiance that it shines with, of any colour.
     pub radiance: f32,

@@ -115,7 +115,6 @@ pub struct Sight {
     planes: [Plane; 5],
     /// The eye, where backs are culled.
     eye: Option<Vec3>,
-    /// Whether the picture has several samples a pixel.
     samples: bool,
 }
 
@@ -127,7 +126,6 @@ struct Plane {
     slack: f32,
 }
 
-/// The camera of a part of the picture.
 #[derive(Clone, Copy, Debug)]
 pub struct SightCamera {
     pub clip_from_world: DMat4,
@@ -137,7 +135,6 @@ pub struct SightCamera {
     pub near_m: f64,
     /// Width and height of its part in pixels.
     pub size: [u32; 2],
-    /// Whether the picture has several samples a pixel.
     pub samples: bool,
 }
 

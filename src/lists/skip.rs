@@ -5,13 +5,12 @@
 //! makes what they leave out zero; the band-limited product is not zero there, so each fades out over [`SKIP_FADE_RAD`]
 //! beyond its threshold.
 //!
-//! A new skip touches this table, the shader that its row names, and a test. Some skips have no switch: lights whose
-//! radiance field is zero on the side of a cluster, entities whose field holds nothing but zeros, fields that no
-//! receiver sees, and what is bounded below `--eps`.
+//! A new skip touches this table, the shader that its row names, and a test. Some skips have no switch: spots whose cone
+//! a cluster is out of, entities whose field holds nothing but zeros, fields that no receiver sees, and what is bounded
+//! below `--eps`.
 
 #[derive(Clone, Copy, Debug)]
 pub struct SkipRow {
-    /// Name on the command line.
     pub name: &'static str,
     /// The macro of the merge shader, where that decides it too, vertex by vertex.
     pub glsl: Option<&'static str>,
@@ -137,17 +136,5 @@ mod tests {
             assert_eq!(row.name.parse(), Ok(only));
         }
         assert!("facing".parse::<Skip>().unwrap_err().contains("horizon, cones, behind"), "always on");
-    }
-
-    #[test]
-    fn every_macro_stands_in_the_merge() {
-        let text = |file: &str| {
-            let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("glsl").join(file);
-            std::fs::read_to_string(path).unwrap()
-        };
-        let merge = ["merge.comp", "merge_cone.glsl", "merge_cap.glsl"].map(text).concat();
-        for row in TABLE {
-            assert!(row.glsl.is_none_or(|name| merge.contains(name)), "{row:?}");
-        }
     }
 }

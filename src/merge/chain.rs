@@ -6,18 +6,16 @@ use crate::sh::product::Tensor;
 /// Coefficients; zero past the last.
 pub type ChainState = [f64; MAX_COEFFICIENTS];
 
-/// Multiplies chains of some bands by factors of some bands.
+/// Multiplies chains by factors of as many bands.
 pub struct Multiplier {
     tensor: Tensor,
 }
 
 impl Multiplier {
-    /// For transfers of `bands` bands and blocked parts of `field_bands`.
-    pub fn new(bands: usize, field_bands: usize) -> Self {
-        Multiplier { tensor: Tensor::new(bands, field_bands, bands) }
+    pub fn new(bands: usize) -> Self {
+        Multiplier { tensor: Tensor::new(bands) }
     }
 
-    /// The chain without a factor.
     pub fn begin(&self, transfer: &[f64]) -> ChainState {
         let mut state = [0.0; MAX_COEFFICIENTS];
         state[..transfer.len()].copy_from_slice(transfer);
@@ -57,11 +55,10 @@ impl Multiplier {
     }
 
     fn count(&self) -> usize {
-        coefficient_count(self.tensor.bands()[0])
+        coefficient_count(self.tensor.bands())
     }
 }
 
-/// The square of the length of all coefficients but the first.
 fn rest(state: &ChainState) -> f64 {
     dot(&state[1..], &state[1..])
 }
@@ -84,7 +81,7 @@ mod tests {
     #[test]
     fn caps_never_brighten() {
         let mut rng = fastrand::Rng::with_seed(9);
-        let multiplier = Multiplier::new(4, 4);
+        let multiplier = Multiplier::new(4);
         for spread in [0.0, 0.2, 3.0] {
             let mut state = multiplier.begin(&clamped_cosine(4, DVec3::Y));
             let mut first = state[0];

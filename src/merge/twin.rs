@@ -13,7 +13,6 @@ use glam::{DQuat, DVec3};
 use rayon::prelude::*;
 use std::f64::consts::PI;
 
-/// One object, as the merge sees it.
 pub struct MergeObject<'f> {
     /// Centre of the bounding sphere in the world, metres.
     pub centre: DVec3,
@@ -36,7 +35,6 @@ pub struct MergeObject<'f> {
 
 pub struct MergeTwin<'t> {
     pub objects: &'t [MergeObject<'t>],
-    /// Index of the one that is lit.
     pub receiver: usize,
     /// Occluders in the order in which they are multiplied.
     pub occluders: &'t [usize],
@@ -50,7 +48,7 @@ pub struct MergeTwin<'t> {
     pub normals: &'t [DVec3],
     /// Transfer vectors, `transfer_stride` floats apart; `None` for the cosine of the normal.
     pub transfer: Option<(&'t [f32], usize)>,
-    /// SH bands of transfer and light; an occlusion field has its own.
+    /// SH bands of transfer, light and fields.
     pub bands: usize,
     pub skip: Skip,
     /// Whether a vertex leaves out an entity in the chain of a light (`None`: of the sky), or the light itself where
@@ -63,16 +61,9 @@ type Coefficients = [f64; MAX_COEFFICIENTS];
 impl MergeTwin<'_> {
     /// Radiosity of every vertex: linear RGB radiance that leaves the surface, without emission.
     pub fn run(&self) -> Vec<[f64; 3]> {
-        let field_bands = self.field_bands();
-        let multiplier = Multiplier::new(self.bands, field_bands);
-        let bands = self.bands.max(field_bands);
-        let rotations: Vec<Rotation> = self.objects.iter().map(|o| Rotation::new(bands, o.rotation)).collect();
+        let multiplier = Multiplier::new(self.bands);
+        let rotations: Vec<Rotation> = self.objects.iter().map(|o| Rotation::new(self.bands, o.rotation)).collect();
         (0..self.positions.len()).into_par_iter().map(|v| self.vertex(v, &multiplier, &rotations)).collect()
-    }
-
-    /// SH bands of the occlusion fields, which all have the same.
-    fn field_bands(&self) -> usize {
-        self.objects.iter().find_map(|o| o.blocked).map_or(self.bands, |field| field.header.bands)
     }
 
     fn vertex(&self, v: usize, multiplier: &Multiplier, rotations: &[Rotation]) -> [f64; 3] {
@@ -121,7 +112,7 @@ impl MergeTwin<'_> {
                 None => chain(begun, &|j| counts(j, true)),
                 Some(volume) => {
                     let one_by_one = chain(begun, &|j| counts(j, volume.has[j]));
-                    let (share, blocked) = volume.volume.lookup(position, self.field_bands());
+                    let (share, blocked) = volume.volume.lookup(position, self.bands);
                     let mut at_once = begun;
                     multiplier.multiply(&mut at_once, &blocked);
                     let mixed = std::array::from_fn(|k| one_by_one[k] + share * (at_once[k] - one_by_one[k]));
@@ -219,9 +210,7 @@ pub fn sheet_before(sheet: &SheetView, to: DVec3, radius_m: f64, skip: Skip) -> 
 /// A bounding sphere as a cone in a vertex's view: the twin of `glsl/merge_cone.glsl`, in angles.
 #[derive(Clone, Copy, Debug)]
 pub struct Cone {
-    /// Unit direction of the sphere's centre.
     pub toward: DVec3,
-    /// Distance of the sphere's centre, metres.
     pub distance: f64,
     half_angle_rad: Option<f64>,
 }
@@ -295,7 +284,6 @@ impl Cap {
         Cap { solid_angle: self.solid_angle * share, ..self }
     }
 
-    /// Takes it out of a chain.
     pub fn cover(&self, multiplier: &Multiplier, state: &mut ChainState) {
         multiplier.cover(state, &self.y, self.solid_angle);
     }

@@ -14,7 +14,6 @@ use crate::shaders::ShaderPermutation;
 use ash::vk;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
-/// How a pass reads what it is given.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Reads {
     /// Everything from storage blocks.
@@ -29,7 +28,6 @@ pub enum Reads {
 /// How the merge is done, where that changes its speed and not its outcome.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct Variant {
-    /// Name on the command line.
     pub name: &'static str,
     pub reads: Reads,
     /// Packed halves become floats by shifts of their bits rather than by the instruction for it.
@@ -93,17 +91,14 @@ pub fn uniform_entities(device: &Device) -> u32 {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MergePermutation {
     pub variant: Variant,
-    /// SH bands of transfer, light and products.
+    /// SH bands of transfer, light and fields.
     pub bands: usize,
-    /// SH bands of occlusion fields.
-    pub field_bands: usize,
     pub storage: Storage,
     /// Samples of the fields. First and last shell are data, not code.
     pub lattice: Lattice,
     pub skip: Skip,
     /// Whether any light meets a chain. Without, there is the sky's chain alone.
     pub lights: bool,
-    /// Whether any mesh is a sheet.
     pub sheets: bool,
     /// Whether what moves reads all that rests at once.
     pub volume: bool,
@@ -114,7 +109,6 @@ pub struct MergePermutation {
 }
 
 impl MergePermutation {
-    /// Format of the texels that fields are read through.
     pub fn field_format(&self) -> vk::Format {
         match self.storage {
             Storage::F32 => vk::Format::R32G32B32A32_SFLOAT,
@@ -128,9 +122,7 @@ impl MergePermutation {
     }
 
     fn packed(&self) -> bool {
-        self.reads_texels()
-            && self.storage == Storage::F16
-            && [self.bands, self.field_bands].iter().all(|&bands| channel_stride(bands).is_multiple_of(8))
+        self.reads_texels() && self.storage == Storage::F16 && channel_stride(self.bands).is_multiple_of(8)
     }
 
     pub fn row(&self) -> ShaderPermutation {
@@ -141,7 +133,6 @@ impl MergePermutation {
     pub fn row_of(&self, file: &'static str) -> ShaderPermutation {
         let lattice = self.lattice;
         let row = ShaderPermutation::new(file, self.bands)
-            .field_bands(self.field_bands)
             .number("Y00", Y00)
             .define("WORKGROUP", CLUSTER_VERTICES)
             .define("ENTRY_BITS", ENTRY_BITS)

@@ -124,7 +124,6 @@ impl Workload {
             gloss: false,
             variant,
             bands: BANDS,
-            field_bands: BANDS,
             storage: Storage::F16,
             lattice: self.lattice,
             skip: Skip::NONE,

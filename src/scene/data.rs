@@ -278,7 +278,8 @@ fn white() -> Vec3 {
 }
 
 /// The linear reflectance of an entity.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
+#[serde(untagged)]
 pub enum Albedo {
     /// It is the same everywhere, 0 to 1.
     Color(Vec3),
@@ -289,15 +290,6 @@ pub enum Albedo {
 impl<T: Into<Vec3>> From<T> for Albedo {
     fn from(color: T) -> Self {
         Albedo::Color(color.into())
-    }
-}
-
-impl Serialize for Albedo {
-    fn serialize<S: serde::Serializer>(&self, into: S) -> std::result::Result<S::Ok, S::Error> {
-        match self {
-            Albedo::Color(color) => color.serialize(into),
-            Albedo::Texture(name) => name.serialize(into),
-        }
     }
 }
 
@@ -322,7 +314,7 @@ impl<'de> Deserialize<'de> for Albedo {
 
 /// A mesh, read from a file or made by a generator. In a scene that was put together in code it may be neither: then only
 /// [`super::Scene::meshes`] has it.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct MeshData {
     /// The name that entities use; it is unique.
     pub name: String,
@@ -348,7 +340,7 @@ pub struct MeshData {
     #[serde(skip_serializing_if = "Option::is_none")]
     pub joined: Option<Vec<[usize; 2]>>,
     /// A generator, written as `plane = {...}`, `sphere = {...}` and so on.
-    #[serde(flatten, skip_serializing_if = "Option::is_none")]
+    #[serde(flatten, deserialize_with = "generator", skip_serializing_if = "Option::is_none")]
     pub generator: Option<Generator>,
 }
 
@@ -376,47 +368,33 @@ impl MeshData {
             generator,
         }
     }
+
+    /// Refuses keys that do not go together.
+    pub(super) fn check(&self) -> std::result::Result<(), &'static str> {
+        let of_gltf = self.file.as_deref().is_some_and(super::gltf::is_gltf);
+        let is_of_part = self.piece.is_some() || self.bend.is_some() || self.pose.is_some();
+        if self.part.is_some() && !of_gltf || is_of_part && self.part.is_none() {
+            return Err("it takes a part of a glTF file alone, and a piece, a bend and a pose of a part alone");
+        }
+        if self.joined.is_some() && (!of_gltf || self.part.is_some()) {
+            return Err("it takes either a part of a glTF file or several joined");
+        }
+        if self.pose.is_some_and(|pose| !pose.time_s.is_finite()) {
+            return Err("it has a pose at a time that is not finite");
+        }
+        if self.bend.is_some_and(|bend| !usable_bend(&bend)) {
+            return Err("it has a bend that is not finite, beyond 1e7, or flat");
+        }
+        Ok(())
+    }
 }
 
-// Written by hand, because serde's flattening of the generator would accept unknown keys.
-impl<'de> Deserialize<'de> for MeshData {
-    fn deserialize<D: serde::Deserializer<'de>>(source: D) -> std::result::Result<Self, D::Error> {
-        use serde::de::Error as _;
-        #[derive(Deserialize)]
-        struct Keys {
-            name: String,
-            file: Option<PathBuf>,
-            part: Option<[usize; 2]>,
-            piece: Option<u32>,
-            bend: Option<[f64; 9]>,
-            pose: Option<PoseData>,
-            joined: Option<Vec<[usize; 2]>>,
-            #[serde(flatten)]
-            rest: toml::Table,
-        }
-        let Keys { name, file, part, piece, bend, pose, joined, rest } = Keys::deserialize(source)?;
-        let fail = |what: &str| Err(D::Error::custom(format!("mesh {name:?} {what}")));
-        if file.is_some() != rest.is_empty() {
-            return fail("has either a file or one generator");
-        }
-        let of_gltf = file.as_deref().is_some_and(super::gltf::is_gltf);
-        let is_of_part = piece.is_some() || bend.is_some() || pose.is_some();
-        if part.is_some() && !of_gltf || is_of_part && part.is_none() {
-            return fail("takes a part of a glTF file alone, and a piece, a bend and a pose of a part alone");
-        }
-        if joined.is_some() && (!of_gltf || part.is_some()) {
-            return fail("takes either a part of a glTF file or several joined");
-        }
-        if pose.is_some_and(|pose| !pose.time_s.is_finite()) {
-            return fail("has a pose at a time that is not finite");
-        }
-        if bend.is_some_and(|bend| !usable_bend(&bend)) {
-            return fail("has a bend that is not finite, beyond 1e7, or flat");
-        }
-        let generator = (!rest.is_empty()).then(|| Generator::deserialize(toml::Value::Table(rest))).transpose();
-        let generator = generator.map_err(|e| D::Error::custom(format!("mesh {name:?}: {}", e.message())))?;
-        Ok(Self { name, file, part, piece, bend, pose, joined, generator })
-    }
+/// Reads what is left of a mesh's keys as its generator: serde's own flattening would accept unknown keys.
+fn generator<'de, D: serde::Deserializer<'de>>(source: D) -> std::result::Result<Option<Generator>, D::Error> {
+    use serde::de::Error as _;
+    let rest = toml::Table::deserialize(source)?;
+    let generator = (!rest.is_empty()).then(|| Generator::deserialize(toml::Value::Table(rest))).transpose();
+    generator.map_err(|error| D::Error::custom(error.message()))
 }
 
 /// Whether a matrix of finite numbers within [`values::SCALE_LIMIT`] keeps what it bends from being flat.

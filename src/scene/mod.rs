@@ -609,6 +609,7 @@ fn build_mesh(
     read: &dyn Fn(&Path) -> Result<Vec<u8>>,
     readers: &mut gltf::Readers,
 ) -> Result<Mesh> {
+    data.check().map_err(|what| Error::Input(what.into()))?;
     let mut mesh = match (&data.file, &data.generator) {
         (Some(file), None) if data.part.is_some() => {
             let [mesh, at] = data.part.unwrap_or_default();
@@ -627,7 +628,7 @@ fn build_mesh(
         }
         (Some(file), None) => Mesh::parse(&read(file)?, &folder.join(file))?,
         (None, Some(generator)) => generator.build()?,
-        _ => return Err(Error::Input("a mesh has either a file or one generator".into())),
+        _ => return Err(Error::Input("it has either a file or one generator".into())),
     };
     mesh.name.clone_from(&data.name);
     Ok(mesh)

@@ -3,8 +3,7 @@
 use super::ALIGNMENT;
 use crate::bake::{self, BakedMesh};
 use crate::error::Result;
-use crate::field::extent::{Extent, extent};
-use crate::field::quantity::{Storage, channel_stride};
+use crate::field::quantity::Storage;
 use crate::field::visibility_volume::VisibilityVolume;
 use crate::field::{Area, FieldHeader, FieldKind, ShadowField};
 use crate::gpu::{Buffer, BufferKind, Device};
@@ -20,8 +19,8 @@ pub struct FieldSlot {
     pub header: FieldHeader,
     /// The bytes of the field in the atlas.
     pub bytes: Range<u64>,
-    /// Directions in which the field is not zero.
-    pub extent: Extent,
+    /// Whether it holds nothing but zeros.
+    pub is_empty: bool,
     /// The area that its object covers from afar, if this is an occlusion field.
     pub area: Area,
 }
@@ -60,7 +59,7 @@ pub(super) fn field_atlas(
             distinct.push((field.clone(), bytes.start));
             let is_occlusion = field.header.kind == FieldKind::Occlusion;
             let area = if is_occlusion { Area::new(field) } else { Area::default() };
-            FieldSlot { header: field.header.clone(), bytes, extent: extent(field), area }
+            FieldSlot { header: field.header.clone(), bytes, is_empty: field.is_empty(), area }
         });
         FieldSlot { header: FieldHeader { mesh: name.to_owned(), ..slot.header.clone() }, ..slot.clone() }
     };
@@ -74,10 +73,7 @@ pub(super) fn field_atlas(
         Storage::F16 => volume.blocked.iter().flat_map(|b| f16::from_f32(*b).to_le_bytes()).collect(),
     });
     let total = total + payload.len() as u64;
-    // Where bands differ, the shader reads as much of any sample as the kind with more bands has. After the last sample
-    // it reads on.
-    let overrun = if options.field_bands.is_some() { 8 * channel_stride(options.most_bands()) as u64 } else { 0 };
-    let mut fields = Buffer::new(device, "fields", BufferKind::Device, total.max(ALIGNMENT) + overrun)?;
+    let mut fields = Buffer::new(device, "fields", BufferKind::Device, total.max(ALIGNMENT))?;
     for (field, first) in distinct {
         fields.fill(first, &field.payload)?;
     }

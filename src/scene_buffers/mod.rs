@@ -13,7 +13,6 @@ use crate::bake::{self, BakedScene, BakedSurface};
 use crate::draw::DrawnMesh;
 use crate::error::Result;
 use crate::field::ShadowField;
-use crate::field::extent::Extent;
 use crate::field::quantity::channel_stride;
 use crate::field::self_visibility::{self, BYTES};
 use crate::field::sheet::Rectangle;
@@ -231,7 +230,7 @@ impl SceneBuffers {
     /// Whether an entity has an occlusion field that holds anything.
     pub fn shadows(&self, scene: &Scene, entity: usize) -> bool {
         let blocked = &self.meshes[scene.entities[entity].mesh].blocked;
-        blocked.as_ref().is_some_and(|slot| slot.extent != Extent::Nothing)
+        blocked.as_ref().is_some_and(|slot| !slot.is_empty)
     }
 
     pub fn surface(&self, entity: usize) -> &DeviceSurface {

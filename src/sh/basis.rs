@@ -28,7 +28,6 @@ pub const MAX_COEFFICIENTS: usize = coefficient_count(MAX_BANDS);
 /// The value of Y00, the constant function: 1 / sqrt(4 pi).
 pub const Y00: f64 = 0.282_094_791_773_878_14;
 
-/// Coefficients of an expansion in `bands` bands.
 pub const fn coefficient_count(bands: usize) -> usize {
     bands * bands
 }

@@ -38,18 +38,6 @@ pub fn cap(bands: usize, axis: DVec3, half_angle_rad: f64) -> Vec<f64> {
     zonal(bands, &cap_zonal(bands, half_angle_rad.cos()), axis)
 }
 
-/// The blocked part of a sphere whose centre lies at `to_centre` from the receiver, in the unit of `radius`.
-///
-/// If the receiver lies inside or on the sphere, every direction is blocked.
-pub fn sphere(bands: usize, to_centre: DVec3, radius: f64) -> Vec<f64> {
-    let distance = to_centre.length();
-    if distance <= radius {
-        return zonal(bands, &cap_zonal(bands, -1.0), DVec3::Z);
-    }
-    let sine = radius / distance;
-    zonal(bands, &cap_zonal(bands, (1.0 - sine * sine).sqrt()), to_centre / distance)
-}
-
 /// The SH of max(0, n . w) for the unit vector `normal`.
 ///
 /// Zonal coefficients sqrt(pi)/2, sqrt(pi/3), sqrt(5 pi)/8, 0, -sqrt(pi)/16, 0, ...: from band 2 on, odd bands are zero

@@ -17,7 +17,7 @@
 //! | [`product`] | the triple-product tensor, products |
 //! | [`product_program`] | the product as straight-line code, and its GLSL |
 //! | [`rotation`] | block-diagonal rotation, and its GLSL |
-//! | [`lobe`] | closed forms: caps, spheres, the clamped cosine |
+//! | [`lobe`] | closed forms: caps, the clamped cosine |
 //! | [`polygon`] | the closed form of flat polygons |
 //! | [`program`] | straight-line programs: run by tests, printed for shaders |
 //!

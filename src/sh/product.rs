@@ -10,7 +10,6 @@ use super::quadrature::sphere_rule;
 /// at 8 bands, and the errors of the sums are below 1e-14.
 const ZERO: f64 = 1e-9;
 
-/// One non-zero entry of a tensor.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Entry {
     pub i: usize,
@@ -20,18 +19,15 @@ pub struct Entry {
     pub value: f64,
 }
 
-/// The non-zero entries of the product of `a_bands` by `b_bands`, cut to `c_bands`.
+/// The non-zero entries of the product of two expansions, cut to as many bands.
 #[derive(Clone, Debug)]
 pub struct Tensor {
-    bands: [usize; 3],
+    bands: usize,
     entries: Vec<Entry>,
-    /// The same entries as [`Tensor::multiply`] uses them. For coefficients that both expansions have, `a_i b_j + a_j
-    /// b_i` is computed once and added to a run of targets.
+    /// The same entries as [`Tensor::multiply`] uses them: `a_i b_j + a_j b_i` is computed once and added to a run of
+    /// targets.
     pairs: Vec<Pair>,
     targets: Vec<(u8, f64)>,
-    /// The other entries, `a_i b_j`, as a flat list: most have one target, and the branch at the end of a loop of one
-    /// iteration is mispredicted.
-    single: Vec<Single>,
 }
 
 /// `a_i b_j + a_j b_i`, or `a_i b_i`, with the end of its run in `targets`.
@@ -42,33 +38,23 @@ struct Pair {
     end: u16,
 }
 
-#[derive(Clone, Copy, Debug)]
-struct Single {
-    i: u8,
-    j: u8,
-    k: u8,
-    value: f64,
-}
-
 impl Tensor {
-    /// Computes the integrals with a rule that is exact for them. Each number of bands is 1 to [`MAX_BANDS`].
-    pub fn new(a_bands: usize, b_bands: usize, c_bands: usize) -> Self {
-        let bands = [a_bands, b_bands, c_bands];
-        assert!(bands.iter().all(|b| (1..=MAX_BANDS).contains(b)), "bands must be 1 to {MAX_BANDS}, not {bands:?}");
-        let [a_count, b_count, c_count] = bands.map(coefficient_count);
-        let most = a_bands.max(b_bands).max(c_bands);
-        let points: Vec<([f64; MAX_COEFFICIENTS], f64)> = sphere_rule(a_bands + b_bands + c_bands - 3)
+    /// Computes the integrals with a rule that is exact for them. `bands` is 1 to [`MAX_BANDS`].
+    pub fn new(bands: usize) -> Self {
+        assert!((1..=MAX_BANDS).contains(&bands), "bands must be 1 to {MAX_BANDS}, not {bands}");
+        let count = coefficient_count(bands);
+        let points: Vec<([f64; MAX_COEFFICIENTS], f64)> = sphere_rule(3 * (bands - 1))
             .into_iter()
             .map(|(direction, weight)| {
                 let mut basis = [0.0; MAX_COEFFICIENTS];
-                evaluate(most, direction, &mut basis);
+                evaluate(bands, direction, &mut basis);
                 (basis, weight)
             })
             .collect();
         let mut entries = Vec::new();
-        let mut sums = vec![0.0; c_count];
-        for i in 0..a_count {
-            for j in 0..b_count {
+        let mut sums = vec![0.0; count];
+        for i in 0..count {
+            for j in 0..count {
                 sums.fill(0.0);
                 for (basis, weight) in &points {
                     let product = weight * basis[i] * basis[j];
@@ -80,16 +66,11 @@ impl Tensor {
                 entries.extend(kept.map(|(k, &value)| Entry { i, j, k, value }));
             }
         }
-        let shared = a_count.min(b_count);
-        let (both, others): (Vec<Entry>, Vec<Entry>) = entries.iter().partition(|entry| entry.i.max(entry.j) < shared);
-        let (pairs, targets) = pair_up(&both);
-        // Coefficients number at most 64.
-        let single = others.iter().map(|e| Single { i: e.i as u8, j: e.j as u8, k: e.k as u8, value: e.value });
-        Self { bands, pairs, targets, single: single.collect(), entries }
+        let (pairs, targets) = pair_up(&entries);
+        Self { bands, pairs, targets, entries }
     }
 
-    /// Bands of the first factor, the second factor and the product.
-    pub fn bands(&self) -> [usize; 3] {
+    pub fn bands(&self) -> usize {
         self.bands
     }
 
@@ -100,14 +81,14 @@ impl Tensor {
 
     /// Writes the product of `a` and `b` to the front of `out`; slices must hold at least their bands' coefficients.
     pub fn multiply(&self, a: &[f64], b: &[f64], out: &mut [f64]) {
-        let [a_count, b_count, c_count] = self.bands.map(coefficient_count);
+        let count = coefficient_count(self.bands);
         // Fixed sizes and masked indices (coefficients number at most 64) leave the inner loop without bounds checks.
         const MASK: usize = MAX_COEFFICIENTS - 1;
         let mut left = [0.0; MAX_COEFFICIENTS];
         let mut right = [0.0; MAX_COEFFICIENTS];
         let mut sums = [0.0; MAX_COEFFICIENTS];
-        left[..a_count].copy_from_slice(&a[..a_count]);
-        right[..b_count].copy_from_slice(&b[..b_count]);
+        left[..count].copy_from_slice(&a[..count]);
+        right[..count].copy_from_slice(&b[..count]);
         let mut targets = self.targets.as_slice();
         let mut start = 0;
         for pair in &self.pairs {
@@ -121,10 +102,7 @@ impl Tensor {
             }
             (targets, start) = (rest, pair.end);
         }
-        for &Single { i, j, k, value } in &self.single {
-            sums[k as usize & MASK] += value * (left[i as usize & MASK] * right[j as usize & MASK]);
-        }
-        out[..c_count].copy_from_slice(&sums[..c_count]);
+        out[..count].copy_from_slice(&sums[..count]);
     }
 }
 

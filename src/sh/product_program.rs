@@ -1,13 +1,9 @@
 //! Multiplication by 1 - b as straight-line code, `t -= product(t, b)`. A program has the inputs t, here called a, and
 //! b, and the outputs t.
 //!
-//! Factors of as many bands as t form `p_ij = a_i b_j + a_j b_i` once for every unordered pair, then `c_k += G_ijk
-//! p_ij`; products with coefficient 0 scale by Y00, which is applied once to `a_0` and `b_0`. Where several `c_k`
+//! `p_ij = a_i b_j + a_j b_i` is formed once for every unordered pair, then `c_k += G_ijk p_ij`; products with coefficient 0 scale by Y00, which is applied once to `a_0` and `b_0`. Where several `c_k`
 //! contain two pairs in the same proportion, `p + ratio q` is formed once (the linear half of the greedy factoring of
 //! reference 3 of [`crate::sh`]). At 4 bands that takes 394 multiply-adds.
-//!
-//! Factors of more or fewer bands form the elements `q_ik = sum_j G_ijk b_j` of the symmetric matrix of multiplication
-//! by b, and `c_k += q_ik a_i`, `c_i += q_ik a_k`.
 
 use std::collections::BTreeMap;
 
@@ -37,7 +33,7 @@ impl Linear {
     fn new(bands: usize) -> Self {
         let mut columns = Vec::new();
         let mut rows = vec![BTreeMap::new(); coefficient_count(bands)];
-        let tensor = Tensor::new(bands, bands, bands);
+        let tensor = Tensor::new(bands);
         let kept: Vec<_> = tensor.entries().iter().filter(|entry| 0 < entry.i && entry.i <= entry.j).collect();
         for run in kept.chunk_by(|x, y| (x.i, x.j) == (y.i, y.j)) {
             for entry in run {
@@ -109,34 +105,24 @@ impl Emitter<'_> {
     }
 }
 
-/// The multiplication of an expansion of `a_bands` by one of `b_bands`, cut to `a_bands`.
-pub fn product_program(a_bands: usize, b_bands: usize) -> Program {
-    let counts = [a_bands, b_bands].map(coefficient_count);
-    let mut program = Program::new([elements("t", counts[0]), elements("b", counts[1])].concat());
-    let sums =
-        if a_bands == b_bands { pair_sums(&mut program, a_bands) } else { matrix_sums(&mut program, a_bands, b_bands) };
-    for (text, sum) in elements("t", counts[0]).into_iter().zip(sums) {
-        program.output(text, sum.expect("every coefficient has a term"));
-    }
-    program
-}
-
-fn pair_sums(program: &mut Program, bands: usize) -> Vec<Option<Value>> {
+/// The multiplication of two expansions, cut to as many bands.
+pub fn product_program(bands: usize) -> Program {
     let count = coefficient_count(bands);
+    let mut program = Program::new([elements("t", count), elements("b", count)].concat());
     let a = Value::Input;
     let b = |j: usize| Value::Input(count + j);
     let mut linear = Linear::new(bands);
     linear.factor();
     // The terms of coefficient 0: c_0 = Y00 a_0 b_0, c_k = Y00 (a_0 b_k + a_k b_0).
     let a_0 = program.define(vec![Term::new(Y00, &[a(0)])]);
-    let b_0 = first_factor(program, b(0));
+    let b_0 = program.define(vec![Term::new(1.0, &[]), Term::new(-Y00, &[b(0)])]);
     let mut sums = vec![None; count];
     program.accumulate(&mut sums[0], vec![Term::new(1.0, &[a(0), b_0])]);
     for (k, sum) in sums.iter_mut().enumerate().skip(1) {
         program.accumulate(sum, vec![Term::new(1.0, &[a(k), b_0]), Term::new(-1.0, &[a_0, b(k)])]);
     }
     let values = vec![None; linear.columns.len()];
-    let mut emitter = Emitter { program, linear: &linear, values, sums: &mut sums };
+    let mut emitter = Emitter { program: &mut program, linear: &linear, values, sums: &mut sums };
     for (column, definition) in linear.columns.iter().enumerate() {
         if let &Column::Pair(i, j) = definition {
             let mut terms = vec![Term::new(1.0, &[a(i), b(j)])];
@@ -146,44 +132,16 @@ fn pair_sums(program: &mut Program, bands: usize) -> Vec<Option<Value>> {
             emitter.emit(column, terms);
         }
     }
-    sums
+    for (text, sum) in elements("t", count).into_iter().zip(sums) {
+        program.output(text, sum.expect("every coefficient has a term"));
+    }
+    program
 }
 
-/// The factor with which coefficient 0 of b scales all of a: 1 - Y00 b_0.
-fn first_factor(program: &mut Program, b_0: Value) -> Value {
-    program.define(vec![Term::new(1.0, &[]), Term::new(-Y00, &[b_0])])
-}
-
-fn matrix_sums(program: &mut Program, a_bands: usize, b_bands: usize) -> Vec<Option<Value>> {
-    let count = coefficient_count(a_bands);
-    let a = Value::Input;
-    let b = |j: usize| Value::Input(count + j);
-    let mut elements: BTreeMap<(usize, usize), Vec<(usize, f64)>> = BTreeMap::new();
-    for entry in Tensor::new(a_bands, b_bands, a_bands).entries() {
-        if entry.i <= entry.k && entry.j > 0 {
-            elements.entry((entry.i, entry.k)).or_default().push((entry.j, entry.value));
-        }
-    }
-    let b_0 = first_factor(program, b(0));
-    let mut sums = vec![None; count];
-    for (k, sum) in sums.iter_mut().enumerate() {
-        program.accumulate(sum, vec![Term::new(1.0, &[a(k), b_0])]);
-    }
-    for ((i, k), row) in elements {
-        let terms = row.into_iter().map(|(j, value)| Term::new(value, &[b(j)])).collect();
-        let element = program.define(terms);
-        program.accumulate(&mut sums[k], vec![Term::new(-1.0, &[element, a(i)])]);
-        if i != k {
-            program.accumulate(&mut sums[i], vec![Term::new(-1.0, &[element, a(k)])]);
-        }
-    }
-    sums
-}
-
-/// GLSL 460 text of `void sh_subtract_product(inout float t[N], float b[M])`, N = a_bands^2, M = b_bands^2:
-/// t -= product(t, b), multiplication by the visibility 1 - b of a factor that is stored as its blocked part b.
-pub fn glsl_subtract(a_bands: usize, b_bands: usize) -> String {
-    let [a_count, b_count] = [a_bands, b_bands].map(coefficient_count);
-    let body = product_program(a_bands, b_bands).glsl_body();
-    format!("void sh_subtract_product(inout float t[{a_count}], float b[{b_count}]) {{\n{body}}}\n")
+/// GLSL 460 text of `void sh_subtract_product(inout float t[N], float b[N])`, N = bands^2: t -= product(t, b),
+/// multiplication by the visibility 1 - b of a factor that is stored as its blocked part b.
+pub fn glsl_subtract(bands: usize) -> String {
+    let count = coefficient_count(bands);
+    let body = product_program(bands).glsl_body();
+    format!("void sh_subtract_product(inout float t[{count}], float b[{count}]) {{\n{body}}}\n")
 }

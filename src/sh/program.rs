@@ -35,7 +35,6 @@ struct Instruction {
     terms: Vec<Term>,
 }
 
-/// A list of instructions without branches or loops.
 #[derive(Clone, Debug, Default)]
 pub struct Program {
     input_texts: Vec<String>,

@@ -19,10 +19,8 @@ type Coefficients = [f64; MAX_COEFFICIENTS];
 
 #[derive(Clone, Copy, Debug)]
 pub struct ExactChain {
-    /// SH bands of transfer, light and every product.
+    /// SH bands of transfer, light and visibility.
     pub bands: usize,
-    /// SH bands of an occluder's visibility.
-    pub visibility_bands: usize,
     /// Rays per factor. Powers of two are stratified best.
     pub rays: u32,
     /// Seed of the ray directions.
@@ -35,14 +33,14 @@ pub struct ExactChain {
 impl Default for ExactChain {
     /// 4 bands throughout, 4096 rays a factor, the merge's chain, every skip.
     fn default() -> Self {
-        ExactChain { bands: 4, visibility_bands: 4, rays: 4096, seed: 2, skip: Skip::ALL }
+        ExactChain { bands: 4, rays: 4096, seed: 2, skip: Skip::ALL }
     }
 }
 
 impl ExactChain {
     /// Radiosity of the given vertices: linear RGB radiance that leaves the surface, without emission.
     pub fn run(&self, world: &World<'_>, vertices: &[Vertex]) -> Vec<[f64; 3]> {
-        let multiplier = Multiplier::new(self.bands, self.visibility_bands);
+        let multiplier = Multiplier::new(self.bands);
         let sky = world.scene.environment.coefficients(self.bands);
         vertices.par_iter().map(|&vertex| self.vertex(world, &multiplier, &sky, vertex)).collect()
     }
@@ -69,11 +67,10 @@ impl ExactChain {
             .into_iter()
             .map(|occluder| {
                 if let Some(sheet) = sheet(&occluder) {
-                    let blocked = if self.visibility_bands > POLYGON_BANDS {
+                    let blocked = if self.bands > POLYGON_BANDS {
                         self.blocked(world, &occluder, points(1 + occluder.entity))
                     } else {
                         let known = sheet.blocked();
-                        let count = coefficient_count(self.visibility_bands);
                         std::array::from_fn(|k| if k < count { known[k] } else { 0.0 })
                     };
                     return (occluder, sheet_above_horizon(&sheet, view.normal, self.skip), blocked, None);
@@ -147,7 +144,7 @@ impl ExactChain {
         for ray in 0..self.rays {
             let direction = cone.axes.cone(points.point(ray), cone.height);
             if world.blocks(occluder, direction, f64::INFINITY) {
-                evaluate(self.visibility_bands, direction, &mut basis);
+                evaluate(self.bands, direction, &mut basis);
                 out.iter_mut().zip(&basis).for_each(|(sum, y)| *sum += y);
             }
         }

@@ -1,9 +1,7 @@
 //! What commands write, where, and that it is what it should be.
 
 use crate::cli::{Folder, SMALL, cache, finish, names};
-use crate::common::generate;
 use serde_json::{Value, json};
-use shadow_fields::asset::obj::write_obj;
 use shadow_fields::scene::Scene;
 use std::path::Path;
 
@@ -156,7 +154,7 @@ fn cap(distance: f64, [x, y, z]: [f64; 3]) -> [f64; 9] {
 #[test]
 fn bake_and_inspect_a_sphere() {
     let Some(folder) = Folder::with_device() else { return };
-    folder.write("ball.obj", write_obj(&generate::sphere(0.5, 3)));
+    folder.write("ball.obj", include_str!("../../assets/meshes/sphere.obj"));
     let bake = "bake ball.obj -o f.sf --lattice cube:12x5 --face-px 32";
     let ran = folder.good(bake);
     assert!(ran.stdout.starts_with("f.sf: 1800 samples"), "{}", ran.stdout);

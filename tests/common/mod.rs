@@ -10,6 +10,7 @@ pub use shadow_fields::asset::generate;
 
 use bytemuck::Pod;
 use glam::Vec3;
+use shadow_fields::asset::Mesh;
 use shadow_fields::bake::Baker;
 use shadow_fields::bake::cache::Cache;
 use shadow_fields::bake::capture::{Capture, Slots};
@@ -112,6 +113,13 @@ impl Gpu {
     pub fn atlas<T: Pod>(&self, capture: &Capture, eyes: &[Vec3], slots: &[Slots]) -> Vec<T> {
         check::capture::atlas(&self.device, capture, eyes, slots).unwrap()
     }
+}
+
+/// A mesh's places and triangles as OBJ text.
+pub fn obj(mesh: &Mesh) -> String {
+    let places = mesh.positions.iter().map(|p| format!("v {} {} {}\n", p.x, p.y, p.z));
+    let faces = mesh.triangles.iter().map(|t| t.map(|v| v + 1)).map(|[a, b, c]| format!("f {a} {b} {c}\n"));
+    places.chain(faces).collect()
 }
 
 /// A PNG that states 65 535 x 65 535 pixels and has none.

@@ -70,7 +70,7 @@ impl Farm {
                 _ => common::generate::sphere(index as f32, 1),
             };
             let path = folder.path().join(format!("meshes/{}.obj", ["a", "b", "c", "d", "e", "f"][index]));
-            std::fs::write(path, shadow_fields::asset::obj::write_obj(&mesh)).unwrap();
+            std::fs::write(path, common::obj(&mesh)).unwrap();
         }
         std::fs::write(folder.path().join("film.toml"), SCENE).unwrap();
         Farm { folder }

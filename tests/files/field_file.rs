@@ -246,33 +246,6 @@ fn nothing_is_left_half_written() {
     assert_eq!(entries(&below), ["field.sf"]);
 }
 
-/// A folder in which no one may create files, the superuser included.
-#[cfg(target_os = "linux")]
-#[test]
-fn folders_without_permission_are_bad_input() {
-    let path = Path::new("/proc/field.sf");
-    let error = small().write(path).expect_err("nothing can be created there");
-    assert!(error.exit_code() == 4 && error.to_string().contains("/proc/field.sf"), "{error}");
-}
-
-#[cfg(unix)]
-#[test]
-fn a_read_only_folder_keeps_the_old_file() {
-    use std::os::unix::fs::PermissionsExt;
-    let folder = tempfile::tempdir().unwrap();
-    let path = folder.path().join("field.sf");
-    small().write(&path).unwrap();
-    let permit = |mode| std::fs::set_permissions(folder.path(), std::fs::Permissions::from_mode(mode)).unwrap();
-    permit(0o555);
-    let other = field(FieldKind::Occlusion, Storage::F32, "cube:2x1", 9);
-    let outcome = other.write(&path);
-    permit(0o755);
-    // The superuser may write all the same; either way the file is whole and alone.
-    let expected = if outcome.is_ok() { other } else { small() };
-    assert_eq!(ShadowField::read(&path).unwrap(), expected);
-    assert_eq!(entries(folder.path()), ["field.sf"]);
-}
-
 #[test]
 fn two_writers_and_a_reader_never_meet() {
     let folder = tempfile::tempdir().unwrap();

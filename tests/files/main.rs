@@ -7,7 +7,7 @@ mod common;
 mod environment;
 mod field_file;
 mod flip;
+mod lookups;
 mod mesh;
 mod picture;
-mod properties;
 mod scene;

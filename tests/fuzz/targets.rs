@@ -1,6 +1,5 @@
 //! Every parser and decoder, with the inputs that mutation starts from.
 
-use super::common::generate;
 use super::{farm, stored};
 use glam::DVec3;
 use shadow_fields::Result;
@@ -65,7 +64,7 @@ const HEADER: &str =
 
 fn meshes() -> Vec<Vec<u8>> {
     let cut = "v 0 0 0 1 0 0\nv 1 0 0 0 1 0\nv 0 1 0 0 0 1\nvn 0 0 1\nvt 0 0\nf 1/1/1 2/1/1 3//1\nf -1 -2 -3\n# end\n";
-    vec![shadow_fields::asset::obj::write_obj(&generate::cuboid(glam::Vec3::ONE, 1)).into_bytes(), cut.into()]
+    vec![embedded::read(Path::new("assets/meshes/cuboid.obj")).unwrap(), cut.into()]
 }
 
 fn mesh(bytes: &[u8]) -> Result<()> {

@@ -113,27 +113,6 @@ fn accessors_without_a_view_are_zeros() {
     assert!(copies > 80);
 }
 
-/// Sparse values over zeros: two corners of a triangle, and the colours of all.
-#[test]
-fn sparse_values_stand_over_zeros() {
-    for (component, size) in [(U8, 1), (U16, 2), (U32, 4)] {
-        let mut model = Model::default();
-        let bytes: Vec<u8> = [1_u32, 2].iter().flat_map(|i| i.to_le_bytes()[..size].to_vec()).collect();
-        let indices = model.view(&bytes);
-        let values: Vec<u8> = [1_f32, 0., 0., 0., 1., 0.].iter().flat_map(|x| x.to_le_bytes()).collect();
-        let values = model.view(&values);
-        let sparse = json!({ "count": 2, "indices": { "bufferView": indices, "componentType": component },
-            "values": { "bufferView": values } });
-        let accessor = json!({ "componentType": F32, "count": 3, "type": "VEC3", "sparse": sparse });
-        let positions = model.push("accessors", accessor);
-        let mesh = model.mesh(json!({ "POSITION": positions }), None, None);
-        model.node(json!({ "mesh": mesh }));
-        let import = load(&model);
-        let found = import.meshes[0].positions.iter().map(|p| p.to_array()).collect::<Vec<_>>();
-        assert_eq!(found, [[0., 0., 0.], [1., 0., 0.], [0., 1., 0.]], "{component}");
-    }
-}
-
 /// A channel without a node moves nothing: each is left out, and the others stay.
 #[test]
 fn channels_without_a_node_are_left_out() {

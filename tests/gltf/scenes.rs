@@ -231,22 +231,25 @@ fn quantised_accessors_are_numbers() {
 fn sparse_accessors_replace_elements() {
     let mut model = Model::default();
     let base = model.positions(&[0., 0., 0., 1., 0., 0., 0., 1., 0.]);
-    let indices = model.view(&[1, 2]);
     let values: Vec<u8> = [5_f32, 0., 0., 0., 7., 0.].iter().flat_map(|x| x.to_le_bytes()).collect();
     let values = model.view(&values);
-    let sparse = json!({ "count": 2, "indices": { "bufferView": indices, "componentType": U8 },
-        "values": { "bufferView": values } });
-    let mut with_base = model.json["accessors"][base].clone();
-    with_base["sparse"] = sparse.clone();
-    let with_base = model.push("accessors", with_base);
-    let bounds = [json!([0, 0, 0]), json!([5, 7, 0])];
-    let without = json!({ "componentType": F32, "count": 3, "type": "VEC3", "sparse": sparse, "min": bounds[0], "max": bounds[1] });
-    let without = model.push("accessors", without);
-    for positions in [with_base, without] {
-        let mesh = model.mesh(json!({ "POSITION": positions }), None, None);
-        model.node(json!({ "mesh": mesh }));
+    for (component, size) in [(U8, 1), (U16, 2), (U32, 4)] {
+        let bytes: Vec<u8> = [1_u32, 2].iter().flat_map(|i| i.to_le_bytes()[..size].to_vec()).collect();
+        let indices = model.view(&bytes);
+        let sparse = json!({ "count": 2, "indices": { "bufferView": indices, "componentType": component },
+            "values": { "bufferView": values } });
+        let mut with_base = model.json["accessors"][base].clone();
+        with_base["sparse"] = sparse.clone();
+        let over_zeros = json!({ "componentType": F32, "count": 3, "type": "VEC3", "sparse": sparse });
+        for accessor in [with_base, over_zeros] {
+            let positions = model.push("accessors", accessor);
+            let mesh = model.mesh(json!({ "POSITION": positions }), None, None);
+            model.node(json!({ "mesh": mesh }));
+        }
     }
-    for mesh in &load(&model).meshes {
+    let meshes = &load(&model).meshes;
+    assert_eq!(meshes.len(), 6);
+    for mesh in meshes {
         assert_eq!(mesh.positions, [Vec3::ZERO, Vec3::new(5., 0., 0.), Vec3::new(0., 7., 0.)]);
     }
 }

@@ -34,7 +34,6 @@ fn merge() -> Vec<(Variant, Reflection)> {
     let permutation = |variant| MergePermutation {
         variant,
         bands: 4,
-        field_bands: 4,
         storage: Storage::F16,
         lattice: Lattice { inner: 1.02, ..Lattice::default() },
         skip: Skip::ALL,

@@ -78,20 +78,6 @@ fn variants_and_bands() {
     }
 }
 
-/// Fields of more or fewer bands than the transfer.
-#[test]
-fn field_bands() {
-    let Some(stage) = stage() else { return };
-    let scene = scene(MIXED);
-    let placements = scene.at(0.0);
-    let base = small();
-    for (bands, field_bands) in [(4, 5), (4, 7), (3, 4), (4, 3)] {
-        let bake = shadow_fields::bake::Options { bands, field_bands: Some(field_bands), ..base.bake };
-        let mut frame = stage.frame(&scene, frame::Options { bake, ..base });
-        agrees(&format!("{bands} bands of transfer, {field_bands} of visibility"), &mut frame, &placements);
-    }
-}
-
 const FLOOR_AND_BALL: &str = r#"
 [[mesh]]
 name = "floor"

@@ -16,7 +16,7 @@ type Cap = (DVec3, f64);
 /// Irradiance of a horizontal plane under a uniform sky of unit irradiance, behind a chain of caps; `multiply` takes the
 /// blocked part of one off the rest.
 fn chain(caps: &[Cap], multiply: fn(&Multiplier, &mut ChainState, &[f64])) -> f64 {
-    let multiplier = Multiplier::new(BANDS, BANDS);
+    let multiplier = Multiplier::new(BANDS);
     let mut t = multiplier.begin(&clamped_cosine(BANDS, DVec3::Y));
     for &(axis, half_angle) in caps {
         let mut blocked = [0.0; MAX_COEFFICIENTS];

@@ -60,7 +60,6 @@ enum Filter {
 const WORDS: usize = 64;
 
 impl Packed {
-    /// The elements, one after the other.
     fn decode(&self, bytes: &[u8]) -> std::result::Result<Vec<u8>, String> {
         let damaged = |error: meshopt::Error| format!("its data are damaged: {error}");
         let bytes_of_indices = |wide: meshopt::Result<Vec<u32>>| -> std::result::Result<Vec<u8>, String> {

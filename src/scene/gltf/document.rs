@@ -48,7 +48,6 @@ const DECODED: [&str; 3] = ["EXT_texture_webp", "KHR_draco_mesh_compression", "K
 
 /// A file that was read and whose indices are within range.
 pub struct Document {
-    /// The JSON.
     pub root: Root,
     /// Channels of animations that move no node, which are not among those of the JSON.
     pub nodeless_channels: usize,
@@ -131,7 +130,6 @@ impl Document {
         Ok((bytes, view.byte_stride.map(|stride| stride.0)))
     }
 
-    /// Bytes of a buffer, for a place of the JSON.
     pub fn slice(&self, buffer: usize, range: Range<usize>, place: &str) -> Result<&[u8]> {
         let bytes = self.buffers.get(buffer).ok_or_else(|| self.fail(place, format!("there is no buffer {buffer}")))?;
         let bytes = bytes.as_ref().ok_or_else(|| {
@@ -210,7 +208,6 @@ impl Document {
     }
 }
 
-/// The JSON and the binary part of a file.
 pub fn split(bytes: &[u8]) -> std::result::Result<(&[u8], Option<&[u8]>), String> {
     if !bytes.starts_with(b"glTF") {
         return Ok((bytes, None));

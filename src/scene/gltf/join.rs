@@ -90,7 +90,6 @@ fn halve<K>(group: &mut [Candidate<K>], out: &mut Vec<Vec<usize>>, fits: &impl F
     halve(behind, out, fits);
 }
 
-/// The box around all centres.
 fn extent<K>(candidates: &[Candidate<K>]) -> (DVec3, DVec3) {
     let low = candidates.iter().fold(DVec3::INFINITY, |low, c| low.min(c.centre));
     (low, candidates.iter().fold(DVec3::NEG_INFINITY, |high, c| high.max(c.centre)))

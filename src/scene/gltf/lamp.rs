@@ -24,7 +24,6 @@ use crate::scene::motion::{Motion, RotationData};
 const RADIUS_SHARE: f64 = 0.01;
 /// Cuts of the icosahedron that stands for a ball: 320 triangles.
 const SUBDIVISIONS: u32 = 2;
-/// Name of the lamps' mesh.
 pub const BALL: &str = "lamp";
 
 /// What stands for the lights of a file that shine.
@@ -32,7 +31,6 @@ pub struct Lamps {
     /// The mesh of all lamps, if there are any.
     pub ball: Option<(MeshData, Mesh)>,
     pub entities: Vec<EntityData>,
-    /// The first directional light.
     pub sun: Option<Sun>,
     /// About the radiance of a white surface in the middle of the scene, lit by all of them.
     pub radiance: f64,

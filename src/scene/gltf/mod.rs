@@ -154,7 +154,6 @@ pub fn load_mesh(path: &Path) -> Result<(Mesh, Notes)> {
     Ok((mesh, notes))
 }
 
-/// A primitive that was read.
 struct Primitive {
     shape: Shape,
     surface: Surface,
@@ -187,7 +186,6 @@ impl Part {
 
 type PartKey = (usize, usize, Option<(usize, u64)>);
 
-/// A part and where it stands.
 struct Placed {
     /// Number of the node or instance among all of the file's scene.
     place: usize,
@@ -241,7 +239,6 @@ impl Reader {
         Ok(self.stage.insert(Rc::new(Stage { stands, tracks })).clone())
     }
 
-    /// The texels of an image.
     pub fn texels(&mut self, image: usize) -> Result<Arc<Texels>> {
         let fail = |what: &str| self.document.fail(format!("images[{image}]"), what);
         if image >= self.document.root.images.len() {

@@ -26,7 +26,6 @@ const SMALL_PIECE: f64 = 1e-3;
 /// The triangles of a primitive. Where it has no normals, every triangle has vertices of its own with its own normal,
 /// as the specification demands.
 pub struct Shape {
-    /// Place in the JSON.
     pub place: String,
     positions: Vec<Vec3>,
     normals: Vec<Vec3>,
@@ -39,7 +38,6 @@ pub struct Shape {
 
 /// Accessors of a primitive by what they hold.
 pub struct Attributed {
-    /// Place in the JSON.
     pub place: String,
     attributes: HashMap<Semantic, usize>,
 }
@@ -192,7 +190,6 @@ impl Shape {
         })
     }
 
-    /// How many pieces there are.
     pub fn piece_count(&self) -> u32 {
         self.pieces().iter().max().map_or(1, |last| last + 1)
     }
@@ -229,7 +226,6 @@ impl Shape {
         Ok(Some(self.source.iter().flat_map(|i| &numbers[*i as usize * stored..][..width]).copied().collect()))
     }
 
-    /// How many triangles there are.
     pub fn triangle_count(&self) -> usize {
         self.triangles.len()
     }

@@ -37,7 +37,6 @@ struct Image {
 
 /// A material's texture on a shape.
 pub struct Applied {
-    /// Number of the image.
     pub image: usize,
     pub texels: Arc<Texels>,
     pub wrap: [Wrap; 2],
@@ -47,14 +46,12 @@ pub struct Applied {
 
 /// The light of a texture on a shape.
 pub enum Glow {
-    /// One colour.
     Even(Vec3),
     /// A colour for each vertex: the mean of the triangles around it, which keeps the light of large ones.
     Varied(Vec<Vec3>),
 }
 
 impl Textures {
-    /// None so far.
     pub fn new(document: &Rc<Document>) -> Self {
         Textures { document: document.clone(), images: HashMap::new(), pixels: 0 }
     }

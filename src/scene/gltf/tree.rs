@@ -30,7 +30,6 @@ const UNIT: f64 = 0.005;
 /// Where a node stands.
 #[derive(Clone, Debug)]
 pub struct Stand {
-    /// Index of the node.
     pub node: usize,
     /// What stands still about it, from its own space to that of the moving node that carries it, or to the world.
     pub fixed: DAffine3,
@@ -55,7 +54,6 @@ impl Stand {
 
 /// A transformation as a placement and what is left of it.
 pub struct SplitTransform {
-    /// Rotation.
     pub rotation: DQuat,
     /// Upper triangular; a multiple of the identity if the scale is uniform.
     pub bend: DMat3,

@@ -79,7 +79,7 @@ fn sphere_error(field: &ShadowField) -> (f64, f64) {
         .map(|&p| {
             let mut found = [0.0; 16];
             field.lookup(p, 0, &mut found);
-            let wanted = lobe::sphere(4, -p, 1.0);
+            let wanted = lobe::cap(4, -p.normalize(), p.length().recip().asin());
             difference(&found, &wanted) / norm(wanted)
         })
         .collect();
@@ -95,25 +95,6 @@ fn sphere_has_its_closed_form() {
     // The bounds are those of an earlier lattice, 6 shells in equal steps of the logarithm: mean 0.032, largest 0.11.
     // The default has more shells, interpolates b / (1 - c), and stays below them.
     assert!(mean < 0.035 && largest < 0.12, "{mean} {largest}");
-}
-
-#[test]
-fn beyond_the_last_shell_the_sphere_fades() {
-    let Some(gpu) = gpu() else { return };
-    let field = sphere_field(&gpu);
-    let mut rng = Rng::with_seed(6);
-    for distance in [8.0, 8.01, 12.0, 30.0, 200.0] {
-        let p = distance * random_direction(&mut rng);
-        let mut found = [0.0; 16];
-        field.lookup(p, 0, &mut found);
-        let wanted = lobe::sphere(4, -p, 1.0);
-        let error = difference(&found, &wanted) / norm(wanted);
-        // (R/d)^2 is within 1.4 %; interpolation between directions adds its own.
-        assert!(error < 0.08, "{distance} r: {error}");
-    }
-    let mut zero = [1.0; 16];
-    field.lookup(1e6 * DVec3::X, 0, &mut zero);
-    assert!(norm(zero) < 1e-10);
 }
 
 fn torus() -> Mesh {

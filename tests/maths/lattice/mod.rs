@@ -125,7 +125,7 @@ fn samples_lie_on_their_shells() {
 #[test]
 fn fitted_lattices_are_round_ones_in_their_own_space() {
     let round: Lattice = "cube:6x5,inner=0.4".parse().unwrap();
-    let fitted: Lattice = "cube:6x5,inner=0.4,centre=0.125:-0.25:0,stretch=1:1.5:1.25".parse().unwrap();
+    let fitted = Lattice { fit: Some(Fit { centre: [0.125, -0.25, 0.0], stretch: [1.0, 1.5, 1.25] }), ..round };
     let mut rng = Rng::with_seed(11);
     for _ in 0..300 {
         let q = random_direction(&mut rng) * 10.0 * rng.f64();
@@ -145,14 +145,6 @@ fn fitted_lattices_are_round_ones_in_their_own_space() {
     assert_eq!(chosen.fitted(Fit::ROUND, |_| 0.5), chosen);
     assert_eq!(fitted.fitted(flat, |_| 0.5), fitted);
     assert_eq!(round.fitted(flat, |_| 0.5).fit(), Fit::ROUND, "a first shell of its own");
-    let round_by_word: Lattice = "cube:6x5,round".parse().unwrap();
-    assert_eq!(round_by_word.fitted(flat, |_| 0.5).fit(), Fit::ROUND);
-    for text in [chosen.to_string(), fitted.to_string(), round.to_string(), round_by_word.to_string()] {
-        assert_eq!(text.parse::<Lattice>().unwrap().to_string(), text);
-    }
-    for text in ["cube:6x5,stretch=1:3:1", "cube:6x5,stretch=1:1", "cube:6x5,centre=2:0:0", "cube:6x5,centre=a:0:0"] {
-        text.parse::<Lattice>().expect_err(text);
-    }
 }
 
 #[test]

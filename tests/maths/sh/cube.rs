@@ -124,12 +124,6 @@ fn projection_returns_the_coefficients_of_an_expansion() {
 }
 
 #[test]
-fn projection_of_a_constant_is_exact() {
-    let projected = project(4, 5, |_, _, _| 2.0);
-    assert!((projected[0] - 4.0 * PI.sqrt()).abs() < 1e-13, "{}", projected[0]);
-}
-
-#[test]
 fn projection_of_a_cap_is_its_closed_form_within_the_edge() {
     let axis = DVec3::new(0.36, -0.48, 0.8);
     let cosine = (PI / 6.0).cos();

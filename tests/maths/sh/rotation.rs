@@ -53,14 +53,6 @@ fn rotated_coefficients_are_the_rotated_function() {
     }
 }
 
-/// A quarter turn about +y takes +z to +x: the sense of rotation, in numbers.
-#[test]
-fn quarter_turn_about_y_takes_z_to_x() {
-    let rotated = apply(&Rotation::new(2, DQuat::from_rotation_y(PI / 2.0)), &[0.5, 0.0, 1.0, 0.0]);
-    // Y10 is +z, Y11 is -x.
-    assert_close(&rotated, &[0.5, 0.0, 0.0, -1.0], "quarter turn");
-}
-
 #[test]
 fn the_program_that_is_printed_equals_the_rotation() {
     let mut rng = Rng::with_seed(13);

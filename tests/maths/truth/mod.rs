@@ -129,15 +129,15 @@ fn the_exact_chain_of_balls_is_that_of_their_closed_forms() {
     let world = World::new(&scene, &shapes, &scene.at(0.0));
     let (vertices, positions): (Vec<_>, Vec<_>) = floor_positions(&scene).into_iter().unzip();
     for bands in [4, 5] {
-        let exact = ExactChain { bands, visibility_bands: bands, skip: Skip::NONE, ..Default::default() }
-            .run(&world, &vertices);
-        let tensor = Tensor::new(bands, bands, bands);
+        let exact = ExactChain { bands, skip: Skip::NONE, ..Default::default() }.run(&world, &vertices);
+        let tensor = Tensor::new(bands);
         for (position, found) in positions.iter().zip(&exact) {
             let mut t = [0.0; MAX_COEFFICIENTS];
             t[..bands * bands].copy_from_slice(&lobe::clamped_cosine(bands, DVec3::Y));
             let balls = [(DVec3::new(0.0, 1.0, 0.0), 0.5), (DVec3::new(0.9, 1.4, 0.3), 0.4)];
             for (centre, radius) in balls {
-                let blocked = lobe::sphere(bands, centre - *position, radius);
+                let to_centre = centre - *position;
+                let blocked = lobe::cap(bands, to_centre.normalize(), (radius / to_centre.length()).asin());
                 let mut product = [0.0; MAX_COEFFICIENTS];
                 tensor.multiply(&t, &blocked, &mut product);
                 t.iter_mut().zip(product).for_each(|(t, p)| *t -= p);

@@ -42,8 +42,9 @@
 //!   others, its own group too, as something that moves does; nothing counts what it passes on as coloured. What a
 //!   texture cuts out is a hole for rays and captures alike ([`asset::pierce`]).
 //! - Sheets: a flat mesh blocks light from both sides. What a rectangle blocks has a closed form, for SH and for sharp
-//!   lights, so nothing is baked of it; other flat meshes have fields as all others do. A point within 0.002 bounding radii of its receiver from the
-//!   sheet's plane counts as that far from it, on the side of its receiver's centre ([`field::sheet`]).
+//!   lights, so nothing is baked of it; other flat meshes have fields as all others do. A point within 0.002 bounding
+//!   radii of its receiver from the sheet's plane counts as that far from it, on the side of its receiver's centre
+//!   ([`field::sheet`]).
 //! - Bounces: every vertex of a rigid group has links to runs of vertices that it sees, and reads the occlusion fields of
 //!   what moves around it for the light that comes from there ([`bounce`]). All that reflects passes its base colour's
 //!   share of light on as a diffuse surface does, metals too.

@@ -70,7 +70,7 @@ pub(super) fn decode(bytes: &[u8]) -> Result<(DynamicImage, bool)> {
     let reader = ImageReader::new(Cursor::new(bytes)).with_guessed_format();
     let mut reader = reader.map_err(|error| Error::Input(error.to_string()))?;
     let format = reader.format().filter(|f| FORMATS.contains(f) && f.reading_enabled());
-    let format = format.ok_or_else(|| Error::Input("expected a picture in PNG, JPEG, EXR or HDR".into()))?;
+    let format = format.ok_or_else(|| Error::Input("expected a picture in PNG, JPEG, WebP, EXR or HDR".into()))?;
     let mut limits = Limits::default();
     // Twice the largest pixel, of four f32: the decoder may hold a copy.
     limits.max_alloc = Some(PIXEL_LIMIT * 32);

@@ -33,7 +33,7 @@ pub struct EnvironmentData {
     #[serde(default = "one", skip_serializing_if = "is_one")]
     pub strength: f32,
     /// Rotation of all parts about +y, degrees, counter-clockwise seen from above.
-    #[serde(default, skip_serializing_if = "crate::field::is_zero")]
+    #[serde(default, skip_serializing_if = "crate::field::is_default")]
     pub turn_deg: f32,
     #[serde(skip_serializing_if = "Option::is_none")]
     pub uniform: Option<Vec3>,

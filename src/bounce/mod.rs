@@ -210,6 +210,8 @@ pub struct Bounce {
     means: ComputePipeline,
     bounce: ComputePipeline,
     texels: bool,
+    /// Whether the scene has sharp lights.
+    soft: bool,
     runs: Buffer,
     areas: Buffer,
     ranges: Buffer,
@@ -219,6 +221,17 @@ pub struct Bounce {
     movers: Option<Movers>,
     /// Steps after which more bounces are not seen.
     steps: u32,
+}
+
+fn pipelines(
+    device: &Arc<Device>,
+    library: &Library,
+    texels: bool,
+    soft: bool,
+    meets: bool,
+) -> Result<[ComputePipeline; 2]> {
+    let pipeline = |name: &str, row: ShaderPermutation| ComputePipeline::new(device, name, &library.shader(&row)?);
+    Ok([pipeline("runs", runs_row(texels, soft))?, pipeline("bounce", bounce_row(texels, soft, meets))?])
 }
 
 impl Bounce {
@@ -238,16 +251,17 @@ impl Bounce {
             && TexelView::fits(device, vk::Format::R32G32B32A32_SFLOAT, 16 * u64::from(counts[1]));
         let texels = merge.reads_texels() && fits;
         let meets = linked.meets();
-        let pipeline = |name: &str, row: ShaderPermutation| ComputePipeline::new(device, name, &library.shader(&row)?);
         let Linked { surfaces, far, ranges, .. } = linked;
         let views_hold = TexelView::fits(device, vk::Format::R32_UINT, 4 * MOST_ENTRIES)
             && self_cells.is_none_or(|cells| TexelView::fits(device, vk::Format::R32G32_UINT, cells.size_bytes));
         let merge = MergePermutation { variant: merge.variant.restricted(views_hold, true), ..merge };
         let movers = || Movers::new(device, library, (surfaces, far), merge, self_cells.is_some(), ranges.len());
+        let [means, bounce] = pipelines(device, library, texels, soft, meets)?;
         Ok(Bounce {
-            means: pipeline("runs", runs_row(texels, soft))?,
-            bounce: pipeline("bounce", bounce_row(texels, soft, meets))?,
+            means,
+            bounce,
             texels,
+            soft,
             runs: Buffer::with_data(device, "runs", &linked.runs)?,
             areas: Buffer::with_data(device, "areas of vertices", &linked.areas)?,
             ranges: Buffer::with_data(device, "ranges of links", &ranges)?,
@@ -257,6 +271,12 @@ impl Bounce {
             counts,
             movers: meets.then(movers).transpose()?,
         })
+    }
+
+    /// Compiles the shaders anew.
+    pub fn rebuild(&mut self, device: &Arc<Device>, library: &Library) -> Result<()> {
+        [self.means, self.bounce] = pipelines(device, library, self.texels, self.soft, self.movers.is_some())?;
+        self.movers.as_mut().map_or(Ok(()), |movers| movers.rebuild(device, library))
     }
 
     /// Finds how many steps surfaces of these albedos need.

@@ -126,6 +126,8 @@ pub(super) struct Movers {
     outgoing: ComputePipeline,
     movers: ComputePipeline,
     permutation: MergePermutation,
+    /// Whether any mesh shadows itself.
+    self_shadows: bool,
     pub surfaces: Surfaces,
     pub far: FarRuns,
     far_data: Buffer,
@@ -140,6 +142,16 @@ pub(super) struct Movers {
     pub cluster_count: u32,
 }
 
+fn pipelines(
+    device: &Arc<Device>,
+    library: &Library,
+    permutation: &MergePermutation,
+    self_shadows: bool,
+) -> Result<[ComputePipeline; 2]> {
+    let pipeline = |name: &str, row: ShaderPermutation| ComputePipeline::new(device, name, &library.shader(&row)?);
+    Ok([pipeline("outgoing", outgoing_row(permutation))?, pipeline("movers", movers_row(permutation, self_shadows))?])
+}
+
 impl Movers {
     pub fn new(
         device: &Arc<Device>,
@@ -149,7 +161,7 @@ impl Movers {
         self_shadows: bool,
         vertices: usize,
     ) -> Result<Self> {
-        let pipeline = |name: &str, row: ShaderPermutation| ComputePipeline::new(device, name, &library.shader(&row)?);
+        let [outgoing, met] = pipelines(device, library, &permutation, self_shadows)?;
         // No buffer is empty.
         let buffer = |name: &str, quads: &[[f32; 4]]| match quads {
             [] => Buffer::zeros(device, name, 16),
@@ -161,8 +173,9 @@ impl Movers {
         };
         let far_data: Vec<[f32; 4]> = far.runs.iter().flat_map(quads).collect();
         Ok(Movers {
-            outgoing: pipeline("outgoing", outgoing_row(&permutation))?,
-            movers: pipeline("movers", movers_row(&permutation, self_shadows))?,
+            outgoing,
+            movers: met,
+            self_shadows,
             far_data: buffer("far runs", &far_data)?,
             movers_data: Upload::new(device, "movers", size_of_val(&surfaces.movers[..]).max(32) as u64)?,
             runs: buffer("runs of movers", bytemuck::cast_slice(&surfaces.runs))?,
@@ -175,6 +188,11 @@ impl Movers {
             surfaces,
             far,
         })
+    }
+
+    pub fn rebuild(&mut self, device: &Arc<Device>, library: &Library) -> Result<()> {
+        [self.outgoing, self.movers] = pipelines(device, library, &self.permutation, self.self_shadows)?;
+        Ok(())
     }
 
     /// Lists what each cluster meets at the lists' time.

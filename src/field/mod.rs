@@ -37,7 +37,7 @@ pub struct FieldHeader {
     pub face_px: u32,
     /// Share of a texel by which what was captured may miss the mesh, since fewer and larger triangles stood for what
     /// was far off; 0 where all triangles were drawn.
-    #[serde(default, skip_serializing_if = "is_zero")]
+    #[serde(default, skip_serializing_if = "is_default")]
     pub level_texels: f64,
     /// Number of sample points inside the solid. They hold captures from just outside the nearest surface.
     pub filled_samples: u32,
@@ -54,9 +54,9 @@ pub struct FieldHeader {
     pub mesh_hash: String,
 }
 
-/// Whether a number of a file may be left out, because it is 0.
-pub(crate) fn is_zero<T: Default + PartialEq>(number: &T) -> bool {
-    *number == T::default()
+/// Whether a value may be left out of a file, where its default stands for it.
+pub(crate) fn is_default<T: Default + PartialEq>(value: &T) -> bool {
+    *value == T::default()
 }
 
 impl FieldHeader {

@@ -52,10 +52,10 @@ pub struct SilhouetteHeader {
     pub view_px: u32,
     /// Texels along an edge of the maps of the object's two halves: half of `map_px`, or 0 where a field has none, as
     /// of convex meshes.
-    #[serde(default, skip_serializing_if = "super::is_zero")]
+    #[serde(default, skip_serializing_if = "super::is_default")]
     pub half_px: u32,
     /// Share of a view's pixel by which what was drawn may miss the mesh; 0 where all of its triangles were drawn.
-    #[serde(default, skip_serializing_if = "super::is_zero")]
+    #[serde(default, skip_serializing_if = "super::is_default")]
     pub level_pixels: f64,
     /// Centre of the bounding sphere in the mesh's own frame, metres.
     pub centre_m: [f32; 3],

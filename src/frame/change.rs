@@ -90,6 +90,12 @@ impl Frame {
         {
             reflections.rebuild(&self.library)?;
         }
+        if ["runs.comp", "bounce.comp", "outgoing.comp", "movers.comp"].into_iter().any(uses)
+            && let Some(bounce) = &mut self.bounce
+        {
+            bounce.rebuild(&self.device, &self.library)?;
+            self.forget();
+        }
         if uses("sharp.comp")
             && let Some(sharp) = &mut self.sharp
         {

@@ -162,7 +162,7 @@ pub struct Output {
     #[serde(skip_serializing_if = "Option::is_none")]
     pub exposure_ev: Option<f32>,
     /// Scene time of the first picture in seconds. The default is 0.
-    #[serde(skip_serializing_if = "crate::field::is_zero")]
+    #[serde(skip_serializing_if = "crate::field::is_default")]
     pub time_s: f64,
 }
 
@@ -221,14 +221,14 @@ impl TryFrom<OutputWritten> for Output {
 pub struct TextureData {
     /// The name that albedos use; it is unique.
     pub name: String,
-    /// A picture in PNG or JPEG, relative to the scene file, or a glTF file that has it. The default is white.
+    /// A picture in PNG, JPEG, WebP or KTX2, relative to the scene file, or a glTF file that has it. The default is white.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub file: Option<PathBuf>,
     /// Which of a glTF file's images it is, counted from 0.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub image: Option<usize>,
     /// How it goes on beyond its edges along u and v: `"repeat"`, which is the default, `"mirror"` or `"clamp"`.
-    #[serde(default, skip_serializing_if = "values::is_default")]
+    #[serde(default, skip_serializing_if = "crate::field::is_default")]
     pub wrap: [Wrap; 2],
     /// Linear, 0 to 1. The default is 1.
     #[serde(default = "white", deserialize_with = "values::albedo")]
@@ -428,7 +428,7 @@ pub struct EntityData {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub gloss: Option<Gloss>,
     /// Textures of a glossy surface besides its albedo.
-    #[serde(default, skip_serializing_if = "values::is_default")]
+    #[serde(default, skip_serializing_if = "crate::field::is_default")]
     pub maps: Maps,
     /// Share of light that does not pass, 0 to 1, and a factor on the albedo: less than 1 for glass and for what is
     /// blended with what lies behind it. The default is 1.

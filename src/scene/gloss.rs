@@ -16,7 +16,7 @@ pub struct Gloss {
     #[serde(deserialize_with = "values::share")]
     pub roughness: f32,
     /// 1 of a metal, whose reflection has the albedo's colour; 0, which is the default, of what is none.
-    #[serde(default, deserialize_with = "values::share", skip_serializing_if = "crate::field::is_zero")]
+    #[serde(default, deserialize_with = "values::share", skip_serializing_if = "crate::field::is_default")]
     pub metallic: f32,
     /// Share of light that a surface which is no metal reflects when faced, 0 to 1. The default is 0.04.
     #[serde(default = "usual_f0", deserialize_with = "values::share", skip_serializing_if = "is_usual_f0")]

@@ -3,7 +3,7 @@
 use glam::{DQuat, DVec4, Vec3};
 use serde::{Deserialize, Serialize};
 
-use super::values::{self, NUMBER_LIMIT, POSITION_LIMIT_M, SCALE_LIMIT};
+use super::values::{NUMBER_LIMIT, POSITION_LIMIT_M, SCALE_LIMIT};
 
 /// Values between two keys.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -107,7 +107,7 @@ pub struct Keys<V> {
     /// One a time.
     pub values: Vec<V>,
     /// Values between two keys; linear where it is left out.
-    #[serde(default, skip_serializing_if = "values::is_default")]
+    #[serde(default, skip_serializing_if = "crate::field::is_default")]
     pub interpolation: Between,
     /// With cubic keys: change a second when the key is reached, one a time.
     #[serde(default = "Vec::new", skip_serializing_if = "Vec::is_empty")]

@@ -121,7 +121,7 @@ pub enum Motion {
         #[serde(default)]
         repeat: bool,
         /// Interpolation between keys.
-        #[serde(default, skip_serializing_if = "values::is_default")]
+        #[serde(default, skip_serializing_if = "crate::field::is_default")]
         interpolation: Interpolation,
     },
     /// Moves the position around a line; the rotation does not change.

@@ -73,11 +73,6 @@ pub fn period<'de, D: Deserializer<'de>>(source: D) -> Result<f64, D::Error> {
     }
 }
 
-/// Whether a value may be left out of a file, where its default stands for it.
-pub(super) fn is_default<T: Default + PartialEq>(value: &T) -> bool {
-    *value == T::default()
-}
-
 /// One factor for all axes.
 pub fn scale<'de, D: Deserializer<'de>>(source: D) -> Result<f32, D::Error> {
     const EXPECTED: &str = "expected one scale, uniform and positive (1e-7 to 1e7)";

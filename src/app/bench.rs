@@ -174,6 +174,15 @@ fn print_time_error(outcome: &TimeErrorOutcome) {
         ("T0 error", "/t0_error_relative"),
     ];
     table(&outcome.budgets, &columns);
+    output::say("\nTime of the merge, and error, by --quality");
+    let columns = [
+        ("scene", "/case"),
+        ("quality", "/quality"),
+        ("merge ms", "/merge_ms/median"),
+        ("error", "/error/rms_relative"),
+        ("bytes of fields", "/field_bytes"),
+    ];
+    table(&outcome.qualities, &columns);
     output::say(
         "\nA frame, everything merged, against ray casting with as many threads at equal error, and the quickest shadow map that errs no \
          more\n(at vertices without drawing, at pixels with it)",

@@ -92,7 +92,7 @@ fn a_scene_of_ones_own() {
     let ran = finish(asked.arg("my ring.toml"));
     assert_eq!(ran.code, 0, "{}", ran.stderr);
     let outcome: Value = serde_json::from_str(&ran.stdout).unwrap();
-    for (part, count) in [("budgets", 1), ("comparisons", 5)] {
+    for (part, count) in [("budgets", 1), ("qualities", 2), ("comparisons", 5)] {
         assert_eq!(outcome[part].as_array().unwrap().len(), count, "{part}");
         assert_eq!(outcome[part][0]["case"], "my ring");
     }

@@ -145,7 +145,7 @@ pub struct Needed {
 /// What the entities of a mesh need. An entity that only receives, or that nothing else can see, needs no field, and an
 /// occluder that is a rectangle none either.
 /// Without light no shadows are needed, without light in spherical harmonics occlusion fields of what moves alone,
-/// without sharp lights no silhouettes. A sharp light needs no radiance field, but one of several colours these. What only members of its own group
+/// without sharp lights no silhouettes. A sharp light needs no radiance field, but may have colours of its parts. What only members of its own group
 /// see of an occluder is in their own visibility, less the shadows of sharp lights.
 pub fn needs(scene: &Scene, mesh: usize, lights: Lights, groups: &Groups) -> Needed {
     let entities = || (0..scene.entities.len()).filter(|&i| scene.entities[i].mesh == mesh);
@@ -216,8 +216,10 @@ pub fn ensure(
             }
             to.silhouette = Some(silhouettes[&hash].clone());
         }
-        to.lamp_colors =
-            needed.lamp_colors.then(|| Arc::new(LampColors::bake(&scene.meshes[index], options.silhouette.cells)));
+        if needed.lamp_colors {
+            let silhouette = to.silhouette.as_deref().filter(|_| mesh.ball_share().is_none());
+            to.lamp_colors = Some(Arc::new(LampColors::bake(mesh, options.silhouette.cells, silhouette)));
+        }
         meshes.push(to);
     }
     let count = scene.entities.len();

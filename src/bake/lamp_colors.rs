@@ -1,11 +1,13 @@
-//! What a light of several colours shows in each direction and from each distance: rays against its mesh.
+//! What a lamp shows in each direction and from each distance: rays against its mesh.
 
 use super::packet::{BlockerTriangle, Blockers};
 use super::triangles::unit_positions;
 use crate::asset::Mesh;
 use crate::field::lamp_colors::{ColorPlane, LampColors, SHELL_STEP, SHELLS};
+use crate::field::silhouette::SilhouetteField;
 use crate::field::silhouette_nodes::NodeGrid;
-use glam::{DMat3, DVec2, DVec3, Mat3A, Vec3A};
+use crate::field::sub_light::SeenLight;
+use glam::{DMat3, DVec2, DVec3, Mat3A, Vec3, Vec3A};
 use rayon::prelude::*;
 
 /// Rays along an edge of the square around a view.
@@ -18,13 +20,16 @@ const NARROW: f64 = 1e-4;
 /// What rays from one point meet.
 struct View {
     count: f64,
+    /// Share of the disc.
+    share: f64,
     sum: DVec3,
     plane: ColorPlane,
 }
 
 impl LampColors {
-    /// The colours of a mesh that has some, for nodes of `cells` cells a face.
-    pub fn bake(mesh: &Mesh, cells: u32) -> Self {
+    /// The colours of a mesh, for nodes of `cells` cells a face. Where the parts of the light shine by its outline,
+    /// `silhouette`, colours make up for what they miss of it.
+    pub fn bake(mesh: &Mesh, cells: u32, silhouette: Option<&SilhouetteField>) -> Self {
         let nodes = NodeGrid::new(cells);
         let positions = unit_positions(mesh);
         let triangle = |(number, corners): (u32, &[u32; 3])| BlockerTriangle {
@@ -36,8 +41,15 @@ impl LampColors {
         let shells: [Vec<[View; 2]>; SHELLS] = std::array::from_fn(|shell| {
             let sine = (shell as f64 * SHELL_STEP).max(AFAR);
             let maps = (0..NodeGrid::map_count(cells)).into_par_iter();
-            maps.map(|map| [1.0, -1.0].map(|sign| view(mesh, &blockers, sign * nodes.map_direction(map), sine)))
-                .collect()
+            let seen = |toward: DVec3| {
+                let mut view = view(mesh, &blockers, toward, sine);
+                if let Some(silhouette) = silhouette {
+                    let factor = (view.share / covered(silhouette, toward, sine).max(0.01)).clamp(0.5, 2.0);
+                    view.plane = view.plane.map(|quad| factor * quad);
+                }
+                view
+            };
+            maps.map(|map| [1.0, -1.0].map(|sign| seen(sign * nodes.map_direction(map)))).collect()
         });
         let all = || shells[0].iter().flatten();
         let mean = all().map(|view| view.sum).sum::<DVec3>() / all().map(|view| view.count).sum::<f64>().max(1.0);
@@ -56,7 +68,7 @@ impl LampColors {
 /// What rays meet from the point whose direction to the centre is `toward` and that sees the bounding sphere under an
 /// angular radius of that sine.
 fn view(mesh: &Mesh, blockers: &Blockers, toward: DVec3, sine: f64) -> View {
-    let colors = mesh.colors.as_deref().unwrap_or_default();
+    let color = |corner: u32| mesh.colors.as_ref().map_or(Vec3::ONE, |colors| colors[corner as usize]);
     let (across, down) = toward.any_orthonormal_pair();
     let eye = -toward / sine;
     let at = |i: usize| (2 * i + 1) as f64 / RAYS as f64 - 1.0;
@@ -73,12 +85,29 @@ fn view(mesh: &Mesh, blockers: &Blockers, toward: DVec3, sine: f64) -> View {
     for ((place, direction), hit) in places.iter().zip(&directions).zip(&hits) {
         let Some(hit) = hit else { continue };
         let (number, [second, third]) = blockers.place(eye.as_vec3a(), *direction, hit);
-        let [a, b, c] = mesh.triangles[number as usize].map(|corner| colors[corner as usize]);
+        let [a, b, c] = mesh.triangles[number as usize].map(color);
         let color = (1.0 - second - third) * a + second * b + third * c;
         met.push((place.extend(1.0), color.as_dvec3()));
     }
     let sum = met.iter().map(|(_, color)| *color).sum();
-    View { count: met.len() as f64, sum, plane: fitted(&met).map(|fit| (fit.x * across + fit.y * down).extend(fit.z)) }
+    let count = met.len() as f64;
+    let plane = fitted(&met).map(|fit| (fit.x * across + fit.y * down).extend(fit.z));
+    View { count, share: count / places.len() as f64, sum, plane }
+}
+
+/// Share of the disc that the light's parts take an outline to cover.
+fn covered(silhouette: &SilhouetteField, toward: DVec3, sine: f64) -> f64 {
+    let light = SeenLight::outlined(toward / sine, 1.0);
+    let mut covered = 0.0;
+    let mut whole = 0.0;
+    for (middle, parts) in light.blocks() {
+        let near = silhouette.near(-toward / sine, middle);
+        for part in parts {
+            covered += part.weight * silhouette.blocked(&near, part.toward, f64::INFINITY, part.tangent());
+            whole += part.weight;
+        }
+    }
+    covered / whole
 }
 
 /// The planes through colours over places (x, y, 1), by least squares: slopes and constant of each channel.
@@ -101,7 +130,6 @@ mod tests {
     use super::*;
     use crate::asset::generate;
     use crate::field::lamp_colors::color_at;
-    use glam::Vec3;
 
     /// A ball that is red on its right and blue on its left.
     #[test]
@@ -110,7 +138,7 @@ mod tests {
         let color = |p: &Vec3| if p.x > 0.0 { Vec3::X } else { Vec3::Z };
         let colors = ball.positions.iter().map(color).collect();
         let mesh = Mesh::new("ball", ball.positions, ball.normals, Some(colors), ball.triangles).unwrap();
-        let found = LampColors::bake(&mesh, 8);
+        let found = LampColors::bake(&mesh, 8, None);
         assert!((found.mean - DVec3::new(0.5, 0.0, 0.5)).abs().max_element() < 0.02, "{}", found.mean);
         let seen = |toward: DVec3, place: DVec3| found.mean * color_at(&found.seen(toward, 0.0), place);
         // From the right, all is red.

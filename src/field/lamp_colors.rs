@@ -1,8 +1,12 @@
-//! Colours of a light that has several, by direction and distance.
+//! Colours of a lamp by direction and distance: of one that has several, and of one that shines by its outline.
 //!
-//! Such a light is a sharp light of its mean colour, and each of its parts ([`super::sub_light`]) has a factor on that.
+//! Such a lamp is a sharp light of its mean colour, and each of its parts ([`super::sub_light`]) has a factor on that.
 //! The factor is a plane over the disc of the bounding sphere: a value at its middle and a slope, fitted to what shows
 //! there. There is a plane for every node of a [`NodeGrid`] and each of [`SHELLS`] distances.
+//!
+//! Sixteen round parts find the share of a thin outline badly: of a ring a seventeenth as thick as wide they send 1.26
+//! of its light. So the factor has the share that rays find over theirs; the ring's error falls from 0.33 to 0.064, that
+//! of one three tenths as thick from 0.070 to 0.030.
 
 use super::silhouette_nodes::NodeGrid;
 use glam::{DVec3, DVec4};

@@ -172,7 +172,7 @@ impl SeenLight {
     }
 
     /// The light with an outline of its own, which is always four blocks: four parts err by 0.07 of the light of a
-    /// torus and by 0.10 of a teapot's, sixteen by 0.02 and 0.04.
+    /// torus and by 0.10 of a teapot's, sixteen by 0.02 and 0.04, without factors ([`super::lamp_colors`]).
     pub fn outlined(to: DVec3, radius: f64) -> Self {
         SeenLight { fine: 1.0, ..Self::new(to, radius) }
     }

@@ -93,9 +93,10 @@ impl LightMethod {
         }
     }
 
-    /// Whether parts of a sharp light of that mesh have colours of their own ([`crate::field::lamp_colors`]).
+    /// Whether the parts of a sharp light of that mesh have colours of their own ([`crate::field::lamp_colors`]): those of
+    /// an outline have them to make up for what they miss of it.
     pub fn has_colors(self, mesh: &Mesh) -> bool {
-        matches!(self, LightMethod::Ball(_) | LightMethod::Outline) && mesh.colors.is_some()
+        self == LightMethod::Outline || (matches!(self, LightMethod::Ball(_)) && mesh.colors.is_some())
     }
 
     /// Whether its shadows have edges.

@@ -39,7 +39,7 @@ pub struct DeviceMesh {
     pub radiance: Option<FieldSlot>,
     /// Silhouette field, if an entity needs one.
     pub silhouette: Option<SilhouetteSlot>,
-    /// Its colours, if it is a sharp light of several.
+    /// Its colours, if it is a lamp with colours of its parts.
     pub lamp_colors: Option<ColorsSlot>,
     /// The rectangle that blocks in place of fields, if the mesh is one.
     pub rectangle: Option<Rectangle>,

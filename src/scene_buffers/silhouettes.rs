@@ -1,4 +1,4 @@
-//! All silhouette fields of a scene in two buffers, and where each begins; and the colours of its lights of several.
+//! All silhouette fields of a scene in two buffers, and where each begins; and the colours of its lamps.
 
 use super::ALIGNMENT;
 use crate::bake::BakedMesh;
@@ -12,7 +12,7 @@ use std::sync::Arc;
 
 /// The silhouette fields of a scene. Where it has none, the buffers hold a little of nothing.
 pub struct Silhouettes {
-    /// Two quads a field and three a node, then three a node of each light of several colours, see
+    /// Two quads a field and three a node, then the colours of lamps, see
     /// `glsl/silhouette_field.glsl`.
     pub nodes: Buffer,
     /// Two words a cell.
@@ -27,7 +27,7 @@ pub struct SilhouetteSlot {
     pub field: Arc<SilhouetteField>,
 }
 
-/// The colours of a mesh that is a sharp light of several.
+/// The colours of a mesh that is a lamp ([`crate::field::lamp_colors`]).
 #[derive(Clone)]
 pub struct ColorsSlot {
     /// Their first quad.

@@ -54,7 +54,7 @@ pub struct SharpPermutation {
     pub outlines: bool,
     /// Whether the scene has a sharp light that shines from one flat side.
     pub panels: bool,
-    /// Whether the scene has a sharp light of several colours.
+    /// Whether the scene has a sharp light whose parts have colours of their own.
     pub colors: bool,
     /// Whether any silhouette field has maps of halves.
     pub halves: bool,

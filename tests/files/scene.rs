@@ -301,7 +301,10 @@ fn each_light_has_the_form_that_its_mesh_gives_it() {
     let LightMethod::Ball(share) = method(1, Lights::Sharp) else { panic!("a sphere is a ball") };
     assert!((0.98..1.0).contains(&share), "{share}");
     assert_eq!(method(2, Lights::Sharp), LightMethod::Outline);
-    assert_eq!(method(3, Lights::Sharp), LightMethod::Harmonics);
+    assert_eq!(method(3, Lights::Sharp), LightMethod::Outline);
+    assert!(
+        method(3, Lights::Sharp).has_colors(&scene.meshes[3]) && !method(2, Lights::Sharp).has_colors(&scene.meshes[2])
+    );
     assert!(matches!(method(4, Lights::Sharp), LightMethod::LampFace(LampFace::Disc(_))));
     assert!(matches!(method(5, Lights::Sharp), LightMethod::LampFace(LampFace::Rectangle(_))));
     assert!((1..6).all(|entity| method(entity, Lights::Sh) == LightMethod::Harmonics));

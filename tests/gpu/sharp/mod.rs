@@ -88,7 +88,7 @@ fn scenes() -> Vec<(&'static str, Scene, f64)> {
         ("a strip", parse(&format!("{HEAD}{LAMPS}{ball}{}", entity("strip", [0.9, 2.1, 0.2], DOWN))), 0.03),
         // A box is up to a tenth narrower or wider than the mean of its widths.
         ("a tube", parse(&format!("{HEAD}{LAMPS}{ball}{}", entity("tube", [0.9, 1.3, 0.2], DOWN))), 0.09),
-        ("a ring of two colours", parse(&format!("{HEAD}{LAMPS}{ball}{}", entity("two", [1.1, 1.5, 0.4], DOWN))), 0.08),
+        ("a ring of two colours", parse(&format!("{HEAD}{LAMPS}{ball}{}", entity("two", [1.1, 1.5, 0.4], DOWN))), 0.07),
         (
             "a ring that glows",
             parse(&format!(
@@ -99,7 +99,7 @@ fn scenes() -> Vec<(&'static str, Scene, f64)> {
                     "rotation = { axis = [1, 0, 0.3], angle_deg = 20 }\nemission = [9, 9, 9]"
                 )
             )),
-            0.05,
+            0.035,
         ),
     ]
 }

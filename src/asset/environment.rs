@@ -10,6 +10,7 @@ use serde::{Deserialize, Serialize};
 
 use super::disc::{Disc, Sun};
 use super::equirect::Equirect;
+use super::peak::WINDOW_NAME;
 use super::short;
 use super::sky::{Dome, Sky};
 use crate::error::{Error, Result};
@@ -298,9 +299,11 @@ impl Environment {
         (sum * f64::from(self.source.strength)).to_array()
     }
 
-    /// Mean radiance, linear RGB, without [`Environment::discs`]: it is shown behind a scene.
+    /// Mean radiance, linear RGB, with windows but without suns: it is shown behind a scene.
     pub(crate) fn mean(&self) -> DVec3 {
-        DVec3::from_array(self.coefficients(1).map(|channel| channel[0] * Y00))
+        let windows = self.discs().into_iter().filter(|disc| disc.name == WINDOW_NAME);
+        let windows = windows.map(|disc| disc.radiance * Disc::solid_angle(disc.half_angle_rad) / (4.0 * PI));
+        DVec3::from_array(self.coefficients(1).map(|channel| channel[0] * Y00)) + windows.sum::<DVec3>()
     }
 
     /// Projection of each channel to `bands` bands, bands^2 coefficients, without [`Environment::discs`]. All parts but

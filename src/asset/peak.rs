@@ -30,6 +30,8 @@ const LEAST_WINDOW: f64 = 0.08;
 /// Solid angle of a window over that of the disc with its second moments, at least. A rectangle has as much up to
 /// edges of 3 to 1.
 const LEAST_FILLED: f64 = 0.55;
+/// Name of the light that a window becomes.
+pub(super) const WINDOW_NAME: &str = "window of the picture";
 /// Windows that are taken out at most: each is a light.
 const MOST_WINDOWS: usize = 3;
 
@@ -149,7 +151,7 @@ impl<'t> Sky<'t> {
         }
         windows.sort_by(|(a, _), (b, _)| b.total_cmp(a));
         let mut take_out = |window: &[usize]| {
-            self.take_out("window of the picture", window, around, [LEAST_HALF_RAD, PI / 4.0], |amount, filled| {
+            self.take_out(WINDOW_NAME, window, around, [LEAST_HALF_RAD, PI / 4.0], |amount, filled| {
                 amount > LEAST_WINDOW * whole && filled > LEAST_FILLED
             })
         };

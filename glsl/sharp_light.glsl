@@ -483,6 +483,9 @@ vec3 chain_sum(Surface surface, Entity shining, bool open, uint first, uint coun
         b++;
     } while (b <= last);
     i = j + 1;
+#if COLORS
+    irradiance = has_colors ? dot(colored, vec3(1.0 / 3.0)) : irradiance;
+#endif
     float ramp = ramp_of(light, shining), cone = clamp(ramp, 0.0, 1.0);
     cone *= cone;
 #if EDGES

@@ -1,4 +1,4 @@
-// A ball or a panel of light and its parts, four to a block. The twin is src/field/sub_light.rs.
+// A ball, a panel or a tube of light and its parts, four to a block. The twin is src/field/sub_light.rs.
 
 struct SeenLight {
     vec3 toward;    // unit, to its centre

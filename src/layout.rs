@@ -67,7 +67,7 @@ shared_struct! {
         gamma: [f32; 2],
         blocked_base: u32,
         /// First quad of its radiance field; of a sharp light that of its colours among the nodes of silhouettes, or
-        /// [`NONE`] where its parts have one.
+        /// [`NONE`] where all its parts have the same.
         radiance_base: u32,
         /// Slope and offset of the shell coordinate, inner and outer shell radius in r.
         radial: [f32; 4],

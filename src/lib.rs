@@ -25,8 +25,8 @@
 //! - Sharp lights: an entity that glows is a sharp light: a ball, a disc, a rectangle, a tube, or whatever its outline
 //!   is. It is cut into 4 or 16 parts ([`field::sub_light`]); in each, the visibilities past all occluders' outlines
 //!   ([`field::silhouette`]) and past the receiver's own mesh ([`field::self_visibility`]) are multiplied. What lies
-//!   beyond the light's surface blocks nothing. Parts of an outline, and of a light of several colours, have their own
-//!   ([`field::lamp_colors`]). The sky goes through SH, and all light with `--lights sh`.
+//!   beyond the light's surface blocks nothing. Parts of an outline, and of a light of several colours, have colours of
+//!   their own ([`field::lamp_colors`]). The sky goes through SH, and all light with `--lights sh`.
 //! - Small occluders: an occluder whose bounding sphere has a half-angle below 12 degrees blocks a point. It takes away
 //!   the chain's value in its direction times the solid angle of a projected area, which is fitted to its outermost
 //!   shell ([`field::Area`]). Up to 16 degrees the point and the field share.

@@ -240,8 +240,8 @@ impl Mesh {
         is_ball.then(|| self.area_m2() / (4.0 * std::f64::consts::PI * radius * radius))
     }
 
-    /// The tube that the mesh is: convex, along one of its axes, and at most twice as wide as thick. Around all of its
-    /// width it is as wide on average as its area says.
+    /// The tube that the mesh is, if it is convex, long along one of its axes, and at most twice as wide as thick. A body
+    /// that is not round counts as the cylinder of its length and area.
     fn tube(&self) -> Option<LampFace> {
         let places = || self.positions.iter().copied();
         let size = places().fold(Vec3::MIN, Vec3::max) - places().fold(Vec3::MAX, Vec3::min);
@@ -250,14 +250,14 @@ impl Mesh {
         if a.max(b) > 2.0 * a.min(b) || !self.is_convex() {
             return None;
         }
-        // Of a cylinder of that length and area.
+        // 2 pi l^2 (radius + radius^2) is the area of a cylinder of length l.
         let share = self.area_m2() / (std::f64::consts::TAU * f64::from(size[axis]).powi(2));
         let radius = ((1.0 + 4.0 * share).sqrt() - 1.0) / 2.0;
-        (radius <= TUBE).then_some(LampFace::Tube { axis, radius })
+        (0.0 < radius && radius <= TUBE).then_some(LampFace::Tube { axis, radius })
     }
 
-    /// The face that shines, of a flat lamp: of a body that shines from one side, or of a rectangle in one colour at
-    /// right angles to +y whose edges run along x and z; and of a tube.
+    /// The face that shines: of a body that shines from one side, of a rectangle in one colour at right angles to +y
+    /// whose edges run along x and z, or of a tube.
     pub fn panel(&self) -> Option<LampFace> {
         self.panel
     }

@@ -1,8 +1,8 @@
 //! The sun and the bright windows of an environment picture, taken out as discs.
 //!
 //! Four bands spread a sun of half a degree over half the sky. What stands out of its surroundings in a small spot
-//! becomes a [`Disc`] instead, which casts sharp shadows, and so does a window that is not too long for a disc. The
-//! picture keeps the rest. Together they send as much light as the whole picture.
+//! becomes a [`Disc`] instead, which casts sharp shadows, and so does a window whose edges differ by less than 3 to 1.
+//! The picture keeps the rest. Together they send as much light as the whole picture.
 
 use super::disc::Disc;
 use glam::DVec3;
@@ -95,8 +95,11 @@ impl<'t> Sky<'t> {
         let taken: DVec3 = texels.iter().map(|&i| over(i)).sum();
         let amount = taken.element_sum();
         let toward = texels.iter().map(|&i| over(i).element_sum() * self.toward(i)).sum::<DVec3>().try_normalize()?;
-        // A disc has half the square of its radius as the mean square of the distance from its middle.
-        let square = |&i: &usize| over(i).element_sum() * self.toward(i).angle_between(toward).powi(2);
+        // A disc has half the square of its radius as the mean square of the distance from its middle. A square texel
+        // adds a sixth of its area.
+        let square = |&i: &usize| {
+            over(i).element_sum() * (self.toward(i).angle_between(toward).powi(2) + self.solid_angle(i) / 6.0)
+        };
         let spread = texels.iter().map(square).sum::<f64>() / amount;
         let half_angle_rad = (2.0 * spread).sqrt().clamp(half_rad[0], half_rad[1]);
         let solid_angle = Disc::solid_angle(half_angle_rad);
@@ -118,7 +121,8 @@ impl<'t> Sky<'t> {
 
     fn take_out_windows(&mut self) -> Vec<Disc> {
         let whole = self.whole();
-        let around = self.median((0..self.texels.len()).step_by((self.texels.len() >> 16).max(1)));
+        // An odd step meets all columns.
+        let around = self.median((0..self.texels.len()).step_by(self.texels.len() >> 16 | 1));
         let brightest = self.texels.iter().map(gray).fold(0.0, f64::max);
         let least = (WINDOW[0] * gray(&around)).max(WINDOW[1] * brightest);
         let mut windows: Vec<(f64, Vec<usize>)> = Vec::new();

@@ -145,8 +145,8 @@ pub struct Needed {
 /// What the entities of a mesh need. An entity that only receives, or that nothing else can see, needs no field, and an
 /// occluder that is a rectangle none either.
 /// Without light no shadows are needed, without light in spherical harmonics occlusion fields of what moves alone,
-/// without sharp lights no silhouettes. A sharp light needs no radiance field, but may have colours of its parts. What only members of its own group
-/// see of an occluder is in their own visibility, less the shadows of sharp lights.
+/// without sharp lights no silhouettes. A sharp light needs no radiance field, but may have colours of its parts. What
+/// only members of its own group see of an occluder is in their own visibility, less the shadows of sharp lights.
 pub fn needs(scene: &Scene, mesh: usize, lights: Lights, groups: &Groups) -> Needed {
     let entities = || (0..scene.entities.len()).filter(|&i| scene.entities[i].mesh == mesh);
     let seen = || entities().filter(|&e| groups.is_seen(e));
@@ -191,6 +191,7 @@ pub fn ensure(
     // Equal meshes of two names share fields, which are looked for once.
     let mut fields: HashMap<String, Arc<ShadowField>> = HashMap::new();
     let mut silhouettes: HashMap<[u8; 32], Arc<SilhouetteField>> = HashMap::new();
+    let mut lamp_colors: HashMap<[u8; 32], Arc<LampColors>> = HashMap::new();
     let mut meshes = Vec::with_capacity(scene.meshes.len());
     for (index, (needed, headers)) in needs.meshes.iter().enumerate() {
         let mesh = scene.caster(index);
@@ -217,8 +218,10 @@ pub fn ensure(
             to.silhouette = Some(silhouettes[&hash].clone());
         }
         if needed.lamp_colors {
+            let mesh = &scene.meshes[index];
             let silhouette = to.silhouette.as_deref().filter(|_| mesh.ball_share().is_none());
-            to.lamp_colors = Some(Arc::new(LampColors::bake(mesh, options.silhouette.cells, silhouette)));
+            let bake = || Arc::new(LampColors::bake(mesh, options.silhouette.cells, silhouette));
+            to.lamp_colors = Some(lamp_colors.entry(mesh.content_hash()).or_insert_with(bake).clone());
         }
         meshes.push(to);
     }

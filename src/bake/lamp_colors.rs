@@ -7,7 +7,7 @@ use crate::field::lamp_colors::{ColorPlane, LampColors, SHELL_STEP, SHELLS};
 use crate::field::silhouette::SilhouetteField;
 use crate::field::silhouette_nodes::NodeGrid;
 use crate::field::sub_light::SeenLight;
-use glam::{DMat3, DVec2, DVec3, Mat3A, Vec3, Vec3A};
+use glam::{DMat3, DVec2, DVec3, DVec4, Mat3A, Vec3, Vec3A};
 use rayon::prelude::*;
 
 /// Rays along an edge of the square around a view.
@@ -16,6 +16,9 @@ const RAYS: usize = 32;
 const AFAR: f64 = 0.02;
 /// Variance of places on the disc below which what shows is too narrow for a slope.
 const NARROW: f64 = 1e-4;
+
+/// Rays that meet a lamp at least, so that their number tells how much of its disc it covers.
+const ENOUGH: f64 = 16.0;
 
 /// What rays from one point meet.
 struct View {
@@ -43,7 +46,7 @@ impl LampColors {
             let maps = (0..NodeGrid::map_count(cells)).into_par_iter();
             let seen = |toward: DVec3| {
                 let mut view = view(mesh, &blockers, toward, sine);
-                if let Some(silhouette) = silhouette {
+                if let Some(silhouette) = silhouette.filter(|_| view.count >= ENOUGH) {
                     let factor = (view.share / covered(silhouette, toward, sine).max(0.01)).clamp(0.5, 2.0);
                     view.plane = view.plane.map(|quad| factor * quad);
                 }
@@ -52,8 +55,13 @@ impl LampColors {
             maps.map(|map| [1.0, -1.0].map(|sign| seen(sign * nodes.map_direction(map)))).collect()
         });
         let all = || shells[0].iter().flatten();
-        let mean = all().map(|view| view.sum).sum::<DVec3>() / all().map(|view| view.count).sum::<f64>().max(1.0);
+        let met: f64 = all().map(|view| view.count).sum();
+        let sum: DVec3 = all().map(|view| view.sum).sum();
+        let mean = if met > 0.0 { sum / met } else { mean_color(mesh) };
         let over_mean = |view: &View| {
+            if view.count == 0.0 {
+                return [DVec4::W; 3];
+            }
             let mut plane = view.plane;
             for (quad, mean) in plane.iter_mut().zip(mean.to_array()) {
                 *quad = if mean > 0.0 { *quad / mean } else { *quad };
@@ -63,6 +71,12 @@ impl LampColors {
         let planes = shells.map(|views| views.iter().map(|pair| pair.each_ref().map(over_mean)).collect());
         LampColors::new(mean, nodes, planes)
     }
+}
+
+/// The mean of the colours of a mesh's vertices.
+fn mean_color(mesh: &Mesh) -> DVec3 {
+    let Some(colors) = &mesh.colors else { return DVec3::ONE };
+    colors.iter().map(|color| color.as_dvec3()).sum::<DVec3>() / colors.len().max(1) as f64
 }
 
 /// What rays meet from the point whose direction to the centre is `toward` and that sees the bounding sphere under an

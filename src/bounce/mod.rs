@@ -275,8 +275,10 @@ impl Bounce {
 
     /// Compiles the shaders anew.
     pub fn rebuild(&mut self, device: &Arc<Device>, library: &Library) -> Result<()> {
-        [self.means, self.bounce] = pipelines(device, library, self.texels, self.soft, self.movers.is_some())?;
-        self.movers.as_mut().map_or(Ok(()), |movers| movers.rebuild(device, library))
+        let own = pipelines(device, library, self.texels, self.soft, self.movers.is_some())?;
+        self.movers.as_mut().map_or(Ok(()), |movers| movers.rebuild(device, library))?;
+        [self.means, self.bounce] = own;
+        Ok(())
     }
 
     /// Finds how many steps surfaces of these albedos need.

@@ -4,9 +4,9 @@
 //! The factor is a plane over the disc of the bounding sphere: a value at its middle and a slope, fitted to what shows
 //! there. There is a plane for every node of a [`NodeGrid`] and each of [`SHELLS`] distances.
 //!
-//! Sixteen round parts find the share of a thin outline badly: of a ring a seventeenth as thick as wide they send 1.26
-//! of its light. So the factor has the share that rays find over theirs; the ring's error falls from 0.33 to 0.064, that
-//! of one three tenths as thick from 0.070 to 0.030.
+//! Sixteen round parts cover a thin outline badly: those of a ring of 1 m with a tube of 6 cm send 1.26 times its light.
+//! So the factor is also the share of the disc that rays find covered over the share that the parts cover. The error of
+//! that ring's light falls from 0.33 to 0.064, and that of a ring with a tube of 30 cm from 0.070 to 0.030.
 
 use super::silhouette_nodes::NodeGrid;
 use glam::{DVec3, DVec4};
@@ -31,6 +31,16 @@ pub struct LampColors {
 impl LampColors {
     pub fn new(mean: DVec3, nodes: NodeGrid, planes: [Vec<[ColorPlane; 2]>; SHELLS]) -> Self {
         LampColors { mean, nodes, planes }
+    }
+
+    /// A bound of the radiance of any part, of emission 1.
+    pub fn brightest(&self) -> f64 {
+        let planes = self.planes.iter().flatten().flatten();
+        let of_plane = |plane: &ColorPlane| -> f64 {
+            let channels = plane.iter().zip(self.mean.to_array());
+            channels.map(|(quad, mean)| mean * (quad.w + quad.truncate().length())).fold(0.0, f64::max)
+        };
+        planes.map(of_plane).fold(0.0, f64::max)
     }
 
     /// What `lamp_colors` in `glsl/silhouette_field.glsl` reads: three quads a node, shell by shell.

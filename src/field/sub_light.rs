@@ -1,4 +1,4 @@
-//! A ball or a panel of light cut into small round lights, so that several occluders and wide lights come out right.
+//! A ball, a panel or a tube of light cut into small round lights, so that several occluders and wide lights come out right.
 //!
 //! One straight edge before a disc is exact only where the occluder's outline is straight over the whole light, and two
 //! occluders multiply only where each blocks its share of every part alike. Both get better as the parts get smaller.
@@ -53,7 +53,8 @@ pub enum LampFace {
 pub const TUBE: f64 = 0.125;
 
 impl LampFace {
-    /// Half the face's extent along x and along z, of a tube along and across it, in bounding radii; of a disc the radius of a circle of equal area.
+    /// Half the face's extent along x and along z, of a tube along and across it, in bounding radii; of a disc the radius
+    /// of a circle of equal area.
     pub fn half(self) -> DVec2 {
         match self {
             LampFace::Disc(share) => DVec2::splat(share.sqrt()),

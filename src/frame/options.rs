@@ -107,7 +107,7 @@ pub struct RenderOptions {
         )
     )]
     pub eps: f32,
-    /// How lights of one colour are computed
+    /// How lamps are computed
     #[cfg_attr(
         feature = "cli",
         arg(long, help_heading = LIGHTING, value_enum, default_value = "sharp", value_name = "sh|sharp")

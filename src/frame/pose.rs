@@ -59,7 +59,10 @@ impl Frame {
         let coloured = device_mesh.radiance.is_some() && entity.emits && !sharp;
         let source = if coloured { &device_mesh.radiance } else { &device_mesh.blocked };
         let facing = entity.spot.map(|spot| (placement.turn() * DVec3::Y, f64::from(spot.outer_deg).to_radians()));
-        let brightest = device_mesh.radiance.as_ref().filter(|_| coloured).map_or(1.0, |s| s.header.radiance_scale);
+        let brightest = match &device_mesh.lamp_colors {
+            Some(slot) if sharp => slot.colors.brightest(),
+            _ => device_mesh.radiance.as_ref().filter(|_| coloured).map_or(1.0, |s| s.header.radiance_scale.into()),
+        };
         EntityBounds {
             centre: self.centre(index, placement),
             radius_m: device_mesh.radius_m * f64::from(placement.scale),
@@ -70,7 +73,7 @@ impl Frame {
             sharp,
             coloured,
             sheet: self.sheet(index, placement).filter(|_| entity.occludes),
-            radiance: f64::from(entity.emission.max_element()) * f64::from(brightest),
+            radiance: f64::from(entity.emission.max_element()) * brightest,
             facing,
         }
     }

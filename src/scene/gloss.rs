@@ -42,7 +42,7 @@ pub struct Maps {
     #[serde(skip_serializing_if = "Option::is_none")]
     pub normal: Option<String>,
     /// Factor on the slope of those normals; 1 unless it is given.
-    #[serde(skip_serializing_if = "Option::is_none")]
+    #[serde(deserialize_with = "values::slope", skip_serializing_if = "Option::is_none")]
     pub normal_scale: Option<f32>,
     /// A factor on the emission that is seen. What the surface shines on others goes by its mesh's colours.
     #[serde(skip_serializing_if = "Option::is_none")]

@@ -21,8 +21,8 @@ pub struct Groups {
 impl Groups {
     /// The groups of a scene: all entities at rest are one, less those that were taken out (`Scene::loosen`).
     ///
-    /// Lights in bands meet what lies before them in the chain of a vertex, so in a scene with such lights every entity
-    /// is a group by itself.
+    /// Lights in bands (`--lights sh`) meet what lies before them in the chain of a vertex, so that every entity is a
+    /// group by itself there.
     pub fn new(scene: &Scene, lights: Lights) -> Self {
         let banded = lights == Lights::Sh && light::has_emitters(scene);
         let rests = |entity: &usize| scene.is_at_rest(*entity) && !banded;

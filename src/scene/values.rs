@@ -10,6 +10,8 @@ use serde::de::{Deserialize, Deserializer, Error};
 pub const POSITION_LIMIT_M: f32 = 1e7;
 /// Scales lie between the inverse of this and this.
 pub const SCALE_LIMIT: f32 = 1e7;
+/// Largest factor on the slopes of normals.
+pub const SLOPE_LIMIT: f32 = 100.0;
 /// Largest angle in degrees and time in seconds; f64 keeps fractions of 1e-7 there.
 pub const NUMBER_LIMIT: f64 = 1e9;
 
@@ -60,6 +62,16 @@ pub fn number<'de, D: Deserializer<'de>>(source: D) -> Result<f64, D::Error> {
         Ok(value)
     } else {
         Err(D::Error::custom(format!("{} is not finite or beyond 1e9", short(value))))
+    }
+}
+
+/// A factor on slopes, which may be left out.
+pub fn slope<'de, D: Deserializer<'de>>(source: D) -> Result<Option<f32>, D::Error> {
+    let value = f32::deserialize(source)?;
+    if value.abs() <= SLOPE_LIMIT {
+        Ok(Some(value))
+    } else {
+        Err(D::Error::custom(format!("a factor on slopes of {} is not within -100 to 100", short(value))))
     }
 }
 

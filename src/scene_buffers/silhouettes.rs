@@ -56,9 +56,13 @@ impl Silhouettes {
             SilhouetteSlot { first_quad: first_quad | halves, field: field.clone() }
         };
         let outlines: Vec<_> = baked.iter().map(|mesh| mesh.silhouette.as_ref().map(&mut slot)).collect();
+        let mut known_colors = HashMap::<*const LampColors, u32>::new();
         let mut colors_slot = |colors: &Arc<LampColors>| {
-            let first_quad = nodes.len() as u32;
-            nodes.extend(colors.quads());
+            let first_quad = *known_colors.entry(Arc::as_ptr(colors)).or_insert_with(|| {
+                let first = nodes.len() as u32;
+                nodes.extend(colors.quads());
+                first
+            });
             ColorsSlot { first_quad, colors: colors.clone() }
         };
         let colors = baked.iter().map(|mesh| mesh.lamp_colors.as_ref().map(&mut colors_slot));

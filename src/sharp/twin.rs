@@ -30,7 +30,7 @@ pub struct SharpLight<'f> {
     pub entity: usize,
     /// Linear RGB radiance.
     pub emission: DVec3,
-    /// Its colours, if it has several; they are factors on the emission.
+    /// The colours of its parts, if they have any: factors on the emission.
     pub colors: Option<&'f LampColors>,
     /// How its light is computed: as a sharp light's.
     pub method: LightMethod,

@@ -302,9 +302,9 @@ fn each_light_has_the_form_that_its_mesh_gives_it() {
     assert!((0.98..1.0).contains(&share), "{share}");
     assert_eq!(method(2, Lights::Sharp), LightMethod::Outline);
     assert_eq!(method(3, Lights::Sharp), LightMethod::Outline);
-    assert!(
-        method(3, Lights::Sharp).has_colors(&scene.meshes[3]) && !method(2, Lights::Sharp).has_colors(&scene.meshes[2])
-    );
+    let has_colors =
+        |entity: usize| method(entity, Lights::Sharp).has_colors(&scene.meshes[scene.entities[entity].mesh]);
+    assert_eq!([1, 2, 3, 4].map(has_colors), [false, true, true, false]);
     assert!(matches!(method(4, Lights::Sharp), LightMethod::LampFace(LampFace::Disc(_))));
     assert!(matches!(method(5, Lights::Sharp), LightMethod::LampFace(LampFace::Rectangle(_))));
     assert!((1..6).all(|entity| method(entity, Lights::Sh) == LightMethod::Harmonics));

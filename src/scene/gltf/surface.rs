@@ -1,6 +1,5 @@
 //! Materials as surfaces that may be painted, reflect and glow.
 
-use ::gltf::json::extensions::texture::Info as TextureExtensions;
 use ::gltf::json::material::{AlphaMode, Material, NormalTexture};
 use ::gltf::json::mesh::Semantic;
 use ::gltf::json::texture::Info;
@@ -16,6 +15,7 @@ use crate::asset::mesh::Attributes;
 use crate::asset::texture::{Texture, Wrap};
 use crate::error::Result;
 use crate::scene::Gloss;
+use crate::scene::values::SLOPE_LIMIT;
 
 /// Colours that differ by less than this share of the brightest are one.
 const EVEN: f32 = 0.01;
@@ -126,15 +126,11 @@ impl Surface {
         attributes.uvs = base.and_then(|base| base.uvs);
         let is_unlit = json.extensions.as_ref().is_some_and(|e| e.unlit.is_some());
         let normal_scale = json.normal_texture.as_ref().map(|normal| normal.scale).filter(|scale| *scale != 1.0);
-        if normal_scale.is_some_and(|scale| !scale.is_finite()) {
-            return Err(document.fail(place, "the scale of its normals is not finite"));
+        if normal_scale.is_some_and(|scale| !(scale.abs() <= SLOPE_LIMIT)) {
+            return Err(document.fail(place, "the scale of its normals is not within -100 to 100"));
         }
-        let normal = json.normal_texture.as_ref().filter(|_| !is_unlit).map(|normal| Info {
-            index: normal.index,
-            tex_coord: normal.tex_coord,
-            extensions: transform(normal),
-            extras: Default::default(),
-        });
+        let normal = json.normal_texture.as_ref().filter(|_| !is_unlit).map(info).transpose();
+        let normal = normal.map_err(|error| document.fail(&place, format!("its normal texture: {error}")))?;
         let normal = textures.applied(normal.as_ref(), shape, notes)?;
         let light = textures.applied(json.emissive_texture.as_ref(), shape, notes)?;
         let mut map = |applied: Option<&Applied>| {
@@ -163,10 +159,11 @@ impl Surface {
     }
 }
 
-/// The transform of a texture of normals, which the reader of glTF files leaves as it is written.
-fn transform(normal: &NormalTexture) -> Option<TextureExtensions> {
-    let written = normal.extensions.as_ref()?.others.clone();
-    serde_json::from_value(written.into()).ok()
+/// A texture of normals as other textures are described: its extensions are left as they are written.
+fn info(normal: &NormalTexture) -> serde_json::Result<Info> {
+    let written = normal.extensions.as_ref().map(|extensions| extensions.others.clone());
+    let extensions = written.map(|written| serde_json::from_value(written.into())).transpose()?;
+    Ok(Info { index: normal.index, tex_coord: normal.tex_coord, extensions, extras: Default::default() })
 }
 
 /// The share of light that a material keeps back, and its base colour less what passes in place of being reflected.

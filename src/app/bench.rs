@@ -68,7 +68,7 @@ struct RunArguments {
     /// A minute on two cores instead of five, or a quarter of an hour for time-error: fewer and smaller scenes and rays
     #[arg(long)]
     quick: bool,
-    /// Folder for the results as JSON
+    /// Folder for the results, as JSON and their tables as CSV
     #[arg(short, long = "output", alias = "out", value_name = "DIR")]
     out: PathBuf,
 }
@@ -80,10 +80,11 @@ pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
             let inputs: Vec<PathBuf> = scene.iter().flat_map(|path| scene::files::of_scene(path)).collect();
             let cases = own.map_or_else(|| time_error::chosen(run.quick, case), |case| Ok(vec![case]))?;
             let measured = |bench: &Bench<'_>| time_error::run(bench, &cases);
-            measure(global, run, "time-error", &inputs, measured, print_time_error)?;
+            measure(global, run, "time-error", &inputs, measured, tell_time_error)?;
         }
         What::Stability(run) => {
-            let trials = measure(global, run, "stability", &[], stability::run, |trials| print_stability(trials))?;
+            let trials =
+                measure(global, run, "stability", &[], stability::run, |trials, to| tell_stability(trials, to))?;
             let failed = trials.iter().filter(|trial| !trial.passed).count();
             if failed > 0 {
                 return Err(Error::Failed(format!("{failed} of {} trials failed", trials.len())));
@@ -91,24 +92,24 @@ pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
         }
         What::Skip { case, run } => {
             let scenes = cases::named(skips::all(run.quick)?, case)?;
-            measure(global, run, "skip", &[], |bench| skips::run(bench, &scenes), |rows| print_skips(rows))?;
+            measure(global, run, "skip", &[], |bench| skips::run(bench, &scenes), |rows, to| tell_skips(rows, to))?;
         }
         What::Scaling { axis, run } => {
-            measure(global, run, "scaling", &[], |bench| scaling::run(bench, axis), |points| print_scaling(points))?;
+            measure(global, run, "scaling", &[], |bench| scaling::run(bench, axis), |rows, to| tell_scaling(rows, to))?;
         }
     }
     Ok(())
 }
 
-/// Opens the device, measures with progress on stderr, writes the outcome as NAME.json, and prints it: as JSON, or the
-/// tables that `print` makes of it. The folder of results must not hold any of the inputs.
+/// Opens the device, measures with progress on stderr, writes the outcome as NAME.json, and the tables that `tell` makes
+/// of it as CSV; prints either. The folder of results must not hold any of the inputs.
 fn measure<T: Serialize>(
     global: &Global,
     run: &RunArguments,
     name: &str,
     inputs: &[PathBuf],
     measured: impl FnOnce(&Bench<'_>) -> Result<T>,
-    print: impl FnOnce(&T),
+    tell: impl FnOnce(&T, &Tables<'_>) -> Result<()>,
 ) -> Result<T> {
     outputs::check_folder("--output", &run.out, inputs)?;
     let context = Context::new(global)?;
@@ -124,9 +125,8 @@ fn measure<T: Serialize>(
     text::write(&run.out.join(format!("{name}.json")), format!("{document:#}\n"))?;
     if global.json {
         output::say(document["outcome"].to_string());
-    } else {
-        print(&outcome);
     }
+    tell(&outcome, &Tables { folder: &run.out, prints: !global.json })?;
     context.finish()?;
     Ok(outcome)
 }
@@ -142,6 +142,35 @@ fn own_case(global: &Global, gltf: &GltfSceneArguments, path: &Path) -> Result<C
     let output = scene.data.output.clone();
     exposure::settle(&mut scene, output.time_s, output.aspect());
     Case::of_file(path, scene)
+}
+
+/// Where the tables of results go.
+struct Tables<'t> {
+    folder: &'t Path,
+    prints: bool,
+}
+
+impl Tables<'_> {
+    /// Writes a table as NAME.csv, with all digits, and prints it below a title. Columns are as those of [`table`].
+    fn add(&self, name: &str, title: &str, rows: &impl Serialize, columns: &[(&str, &str)]) -> Result<()> {
+        let quoted = |text: &str| format!("\"{}\"", text.replace('"', "\"\""));
+        let line = |cells: Vec<String>| cells.join(",") + "\n";
+        let mut csv = line(columns.iter().map(|(title, _)| quoted(title)).collect());
+        for row in json!(rows).as_array().map_or(&[][..], Vec::as_slice) {
+            let cell = |(_, pointer): &(&str, &str)| match row.pointer(pointer) {
+                None | Some(Value::Null) => String::new(),
+                Some(Value::String(text)) => quoted(text),
+                Some(other) => other.to_string(),
+            };
+            csv += &line(columns.iter().map(cell).collect());
+        }
+        text::write(&self.folder.join(format!("{name}.csv")), csv)?;
+        if self.prints {
+            output::say(title);
+            table(rows, columns);
+        }
+        Ok(())
+    }
 }
 
 /// Prints rows of results: each column is its header and the JSON pointer of its value in a row.
@@ -160,8 +189,8 @@ pub fn table(rows: &impl Serialize, columns: &[(&str, &str)]) {
     output::table(&header, &cells.collect::<Vec<_>>());
 }
 
-fn print_time_error(outcome: &TimeErrorOutcome) {
-    output::say("Relative RMS error over vertices against rays from them, by cause (p99 and max of the total)");
+fn tell_time_error(outcome: &TimeErrorOutcome, to: &Tables<'_>) -> Result<()> {
+    let title = "Relative RMS error over vertices against rays from them, by cause (p99 and max of the total)";
     let columns = [
         ("scene", "/case"),
         ("bands", "/bands/rms_relative"),
@@ -173,8 +202,8 @@ fn print_time_error(outcome: &TimeErrorOutcome) {
         ("max", "/total/max_relative"),
         ("T0 error", "/t0_error_relative"),
     ];
-    table(&outcome.budgets, &columns);
-    output::say("\nTime of the merge, and error, by --quality");
+    to.add("budgets", title, &outcome.budgets, &columns)?;
+    let title = "\nTime of the merge, and error, by --quality";
     let columns = [
         ("scene", "/case"),
         ("quality", "/quality"),
@@ -182,11 +211,9 @@ fn print_time_error(outcome: &TimeErrorOutcome) {
         ("error", "/error/rms_relative"),
         ("bytes of fields", "/field_bytes"),
     ];
-    table(&outcome.qualities, &columns);
-    output::say(
-        "\nA frame, everything merged, against ray casting with as many threads at equal error, and the quickest shadow map that errs no \
-         more\n(at vertices without drawing, at pixels with it)",
-    );
+    to.add("qualities", title, &outcome.qualities, &columns)?;
+    let title = "\nA frame, everything merged, against ray casting with as many threads at equal error, and the quickest shadow map that errs no \
+         more\n(at vertices without drawing, at pixels with it)";
     let columns = [
         ("scene", "/title"),
         ("frame ms", "/frame_wall_ms/median"),
@@ -197,14 +224,14 @@ fn print_time_error(outcome: &TimeErrorOutcome) {
         ("merge alone", "/merge_speed_up_at_equal_rms_ratio"),
         ("map ms", "/map_ms_at_equal_rms"),
     ];
-    table(&outcome.comparisons, &columns);
+    to.add("comparisons", title, &outcome.comparisons, &columns)
 }
 
-fn print_stability(trials: &[Trial]) {
-    output::say(format!(
+fn tell_stability(trials: &[Trial], to: &Tables<'_>) -> Result<()> {
+    let title = format!(
         "Odd scenes: everything finite, the same bytes when merged again, radiosity within its bound, and within {NEAR_TWIN:e} \
          of the f64 twin"
-    ));
+    );
     let columns = [
         ("scene", "/name"),
         ("fields", "/storage"),
@@ -215,14 +242,12 @@ fn print_stability(trials: &[Trial]) {
         ("against f64", "/twin_error_relative"),
         ("passed", "/passed"),
     ];
-    table(&trials, &columns);
+    to.add("stability", &title, &trials, &columns)
 }
 
-fn print_skips(rows: &[skips::SkipCost]) {
-    output::say(
-        "Times of a frame without drawing, in turns without and with the skip (for \"hidden\" with drawing, at 1280x720).\nErrors \
-         and changes are relative to the RMS radiosity.",
-    );
+fn tell_skips(rows: &[skips::SkipCost], to: &Tables<'_>) -> Result<()> {
+    let title = "Times of a frame without drawing, in turns without and with the skip (for \"hidden\" with drawing, at 1280x720).\nErrors \
+         and changes are relative to the RMS radiosity.";
     let columns = [
         ("scene", "/case"),
         ("skip", "/skip"),
@@ -235,11 +260,11 @@ fn print_skips(rows: &[skips::SkipCost]) {
         ("on error", "/on/error/rms_relative"),
         ("most change", "/change/max_relative"),
     ];
-    table(&rows, &columns);
+    to.add("skip", title, &rows, &columns)
 }
 
-fn print_scaling(points: &[scaling::ScalingPoint]) {
-    output::say("Frames without drawing, in milliseconds: everything moves, one entity moves, nothing moves");
+fn tell_scaling(points: &[scaling::ScalingPoint], to: &Tables<'_>) -> Result<()> {
+    let title = "Frames without drawing, in milliseconds: everything moves, one entity moves, nothing moves";
     let columns = [
         ("axis", "/axis"),
         ("vertices", "/vertices"),
@@ -254,5 +279,5 @@ fn print_scaling(points: &[scaling::ScalingPoint]) {
         ("error", "/error"),
         ("device bytes", "/device_bytes"),
     ];
-    table(&points, &columns);
+    to.add("scaling", title, &points, &columns)
 }

@@ -14,6 +14,11 @@ fn one_case() {
     let out = folder.at("out");
     let document: Value = serde_json::from_slice(&folder.read("out/time-error.json")).unwrap();
     assert_eq!(printed["budgets"], document["outcome"]["budgets"]);
+    let csv = String::from_utf8(folder.read("out/qualities.csv")).unwrap();
+    let lines: Vec<Vec<&str>> = csv.lines().map(|line| line.split(',').collect()).collect();
+    assert_eq!(lines[0][..3], ["\"scene\"", "\"quality\"", "\"merge ms\""]);
+    let quality = &document["outcome"]["qualities"][1];
+    assert_eq!((lines.len(), lines[2].last()), (3, Some(&quality["field_bytes"].to_string().as_str())), "{csv}");
     let outcome = &document["outcome"];
 
     // The ladder: what causes add up to is near the whole, and no cause is free.

@@ -80,8 +80,8 @@ impl<'t> Sky<'t> {
         })
     }
 
-    /// Takes from some texels what is over `around`, as a disc of at most half the diameter `most_rad`, where `counts`
-    /// says so of its light and of its solid angle over that of the texels.
+    /// Takes from some texels what is over `around`, as a disc whose half diameter lies within `half_rad`. `counts` decides
+    /// whether, by its light and by the solid angle of the texels over that of the disc.
     fn take_out(
         &mut self,
         name: &'static str,

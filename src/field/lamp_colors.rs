@@ -23,6 +23,8 @@ pub type ColorPlane = [DVec4; 3];
 pub struct LampColors {
     /// Mean over all directions and what is seen in them, of emission 1.
     pub mean: DVec3,
+    /// A bound of the radiance of any part, of emission 1.
+    pub brightest: f64,
     nodes: NodeGrid,
     /// For each shell and each map of the grid, as its direction sees it and as the opposite direction does.
     planes: [Vec<[ColorPlane; 2]>; SHELLS],
@@ -30,17 +32,12 @@ pub struct LampColors {
 
 impl LampColors {
     pub fn new(mean: DVec3, nodes: NodeGrid, planes: [Vec<[ColorPlane; 2]>; SHELLS]) -> Self {
-        LampColors { mean, nodes, planes }
-    }
-
-    /// A bound of the radiance of any part, of emission 1.
-    pub fn brightest(&self) -> f64 {
-        let planes = self.planes.iter().flatten().flatten();
         let of_plane = |plane: &ColorPlane| -> f64 {
-            let channels = plane.iter().zip(self.mean.to_array());
+            let channels = plane.iter().zip(mean.to_array());
             channels.map(|(quad, mean)| mean * (quad.w + quad.truncate().length())).fold(0.0, f64::max)
         };
-        planes.map(of_plane).fold(0.0, f64::max)
+        let brightest = planes.iter().flatten().flatten().map(of_plane).fold(0.0, f64::max);
+        LampColors { mean, brightest, nodes, planes }
     }
 
     /// What `lamp_colors` in `glsl/silhouette_field.glsl` reads: three quads a node, shell by shell.

@@ -60,7 +60,7 @@ impl Frame {
         let source = if coloured { &device_mesh.radiance } else { &device_mesh.blocked };
         let facing = entity.spot.map(|spot| (placement.turn() * DVec3::Y, f64::from(spot.outer_deg).to_radians()));
         let brightest = match &device_mesh.lamp_colors {
-            Some(slot) if sharp => slot.colors.brightest(),
+            Some(slot) if sharp => slot.colors.brightest,
             _ => device_mesh.radiance.as_ref().filter(|_| coloured).map_or(1.0, |s| s.header.radiance_scale.into()),
         };
         EntityBounds {

@@ -79,7 +79,8 @@ fn excess(field: &ShadowField, place: DVec3, across: DVec3) -> f64 {
     };
     let largest =
         at(0.0).iter().fold(field.header.lattice.unscale(field.header.lattice.distance(place)), |m, x| m.max(x.abs()));
-    let (tiny, step) = (1e-9, 1e-6);
+    let tiny = 1e-9;
+    let step = 1e-6;
     let jump = apart(&at(tiny), &at(-tiny));
     let slope = (apart(&at(2.0 * step), &at(step)) / step).max(apart(&at(-2.0 * step), &at(-step)) / step);
     (jump - 4.0 * tiny * slope) / largest

@@ -4,21 +4,22 @@
 #include "generated/structs.glsl"
 layout(local_size_x = 64) in;
 
-layout(std430, binding = 0) readonly buffer Entities { Entity entities[]; };
-layout(std430, binding = 1) readonly buffer Ranges { uvec2 ranges[]; }; // first link; how many, and above them the entity
+#define ENTITY_BINDING 0
+#include "entities.glsl"
 #include "readable.glsl"
+READ_UVEC2(1, Ranges, ranges, range_at) // first link; how many, and above them the entity
 READ_UINT(2, Links, links, link_at)
 READ_VEC4(3, RunLight, run_light, run_light_at)
-layout(std430, binding = 4) readonly buffer Direct { vec4 direct[]; };
+READ_VEC4(4, Direct, direct, direct_at)
 layout(std430, binding = 5) writeonly buffer Radiosity { vec4 radiosity[]; };
 #if SOFT
 // The same without the light of sharp lights, for pixels that evaluate them.
-layout(std430, binding = 6) readonly buffer SoftDirect { vec4 soft_direct[]; };
+READ_VEC4(6, SoftDirect, soft_direct, soft_direct_at)
 layout(std430, binding = 7) writeonly buffer Soft { vec4 soft[]; };
 #endif
 #if MOVERS
 // Of other groups: share of the view times radiosity, and the share that they take.
-layout(std430, binding = 8) readonly buffer Incoming { vec4 incoming[]; };
+READ_VEC4(8, Incoming, incoming, incoming_at)
 #endif
 layout(push_constant) uniform Push { uint count; uint last; uint meets; } push;
 
@@ -27,7 +28,7 @@ void main() {
     if (i >= push.count) {
         return;
     }
-    uvec2 range = ranges[i];
+    uvec2 range = range_at(i);
     uint count = range.y & 255;
     vec3 sum = vec3(0.0);
     for (uint k = range.x; k < range.x + count; k++) {
@@ -37,14 +38,15 @@ void main() {
     sum /= WHOLE_SHARE;
 #if MOVERS
     if (push.meets != 0) {
-        sum = sum * (1.0 - incoming[i].w) + incoming[i].rgb;
+        vec4 incoming = incoming_at(i);
+        sum = sum * (1.0 - incoming.w) + incoming.rgb;
     }
 #endif
-    vec4 bounced = vec4(PI * entities[range.y >> 8].albedo * sum, 0.0); // albedo is over pi
-    radiosity[i] = direct[i] + bounced;
+    vec4 bounced = vec4(PI * ENTITY(range.y >> 8).albedo * sum, 0.0); // albedo is over pi
+    radiosity[i] = direct_at(i) + bounced;
 #if SOFT
     if (push.last != 0) {
-        soft[i] = soft_direct[i] + bounced;
+        soft[i] = soft_direct_at(i) + bounced;
     }
 #endif
 }

@@ -10,12 +10,14 @@ layout(local_size_x = WORKGROUP) in;
 
 const uint NONE = 0xffffffffu;
 #include "far.glsl"
-layout(std430, binding = 4) readonly buffer Clusters { Cluster clusters[]; };
+#define CLUSTER_BINDING 4
+#include "clusters.glsl"
 #define FIELD_BINDING 5
 #include "field.glsl"
 READ_VEC4(6, Transfers, transfers, transfer_quad)
 READ_VEC4(7, Vertices, vertices, vertex_quad)
-READ_VEC4(8, Outgoing, outgoing, outgoing_at) // nine coefficients an entity, its frame: area times light; area
+#define LEAVING_BINDING 8
+#include "leaving.glsl"
 layout(std430, binding = 9) writeonly buffer Incoming { vec4 incoming[]; }; // share times radiosity; share taken
 #if SELF
 READ_UVEC2(10, SelfCells, self_cells, self_cell)
@@ -23,19 +25,8 @@ READ_UVEC2(10, SelfCells, self_cells, self_cell)
 #include "bytes.glsl"
 #include "self_visibility.glsl"
 #endif
+READ_VEC4(11, Spheres, spheres, sphere_at) // two a distant mover: from the receiver's centre, square of its radius; light, weight
 #include "merge_cone.glsl"
-
-// Mean radiosity of those surfaces of a mover that are seen along a direction, which comes from the mover in its frame:
-// the light that leaves it that way, over its area as seen from there.
-vec3 seen(uint e, vec3 direction) {
-    float y[COEFFICIENTS];
-    sh_basis(direction, y);
-    vec4 sum = vec4(0.0);
-    [[unroll]] for (uint k = 0; k < min(COEFFICIENTS, 9); k++) {
-        sum += y[k] * outgoing_at(9 * e + k);
-    }
-    return max(sum.rgb, 0.0) / max(sum.w, 0.1 * y[0] * outgoing_at(9 * e).w);
-}
 
 // The receiver's side of a vertex, in its own frame.
 struct Own {
@@ -101,18 +92,30 @@ void sum_far(Entity receiver, vec3 middle, uint v, uint first, uint count) {
     barrier();
 }
 
+// Share of the cosine-weighted hemisphere that a sphere takes: exact above the horizon, and within 0.04 of its sine where
+// the horizon cuts it.
+float sphere_share(float sine, float cosine) {
+    float above = clamp(cosine + sine, 0.0, 2.0 * sine);
+    return sine * sine * max(cosine, above * above / max(4.0 * sine, 1e-20));
+}
+
 void main() {
-    Cluster cluster = clusters[gl_WorkGroupID.x];
+    Cluster cluster = cluster_at(gl_WorkGroupID.x);
     Entity receiver = ENTITY(cluster.receiver);
     uint v = gl_LocalInvocationID.x;
     uint first = cluster.entry_first, end = first + cluster.entry_count;
     vec3 middle = uintBitsToFloat(uvec3(entry_at(first), entry_at(first + 1), entry_at(first + 2)));
     uint near_count = entry_at(first + 3), far_count = entry_at(first + 4);
+    uint sphere_first = entry_at(first + 5), sphere_count = entry_at(first + 6);
     first += CUT_HEADER;
     if (far_count > 0) {
         sum_far(receiver, receiver.centre.xyz + middle, v, first + near_count, far_count);
     }
     if (v >= cluster.vertex_count) {
+        return;
+    }
+    if (cluster.entry_count == CUT_HEADER && sphere_count == 0) {
+        incoming[cluster.radiosity_first + v] = vec4(0.0);
         return;
     }
     uint at = 2 * (cluster.vertex_first + v);
@@ -140,8 +143,19 @@ void main() {
     }
     vec3 sum = vec3(0.0);
     float taken = 0.0;
+    for (uint i = sphere_first; i < sphere_first + sphere_count; i++) {
+        vec4 sphere = sphere_at(2 * i), light = sphere_at(2 * i + 1);
+        vec3 to = sphere.xyz - position;
+        float distance = length(to);
+        vec3 toward = to / max(distance, 1e-20);
+        float sine = min(sqrt(sphere.w) / max(distance, 1e-20), 1.0);
+        float share = light.w * sphere_share(sine, dot(normal, toward));
+        share *= own_visible(own, to_object(receiver, toward), sine, distance * receiver.centre.w);
+        sum += share * light.rgb;
+        taken += share;
+    }
     for (uint i = first + near_count + far_count; i < end; i++) {
-        uint e = entry_at(i);
+        uint packed = entry_at(i), e = packed & ((1u << RUN_BITS) - 1);
         Entity mover = ENTITY(e);
         mover.centre.xyz -= receiver.centre.xyz;
         Cone cone = cone_of(mover.centre, position);
@@ -155,15 +169,10 @@ void main() {
         [[unroll]] for (uint k = 0; k < COEFFICIENTS; k++) {
             share += b[k] * cosine[k];
         }
-        share *= above_horizon(cone, normal) * mover.opacity / PI;
+        share *= above_horizon(cone, normal) * mover.opacity * float(packed >> RUN_BITS) / (WHOLE_SHARE * PI);
         share *= own_visible(own, to_object(receiver, cone.toward), cone.sine, cone.distance * receiver.centre.w);
         share = max(share, 0.0);
-        // From the middle of the directions that the mover blocks: band 1, of which x and y are negative.
-        vec3 middle = from;
-#if COEFFICIENTS >= 4
-        middle = vec3(b[3], b[1], -b[2]);
-#endif
-        sum += share * seen(e, middle / max(length(middle), 1e-20));
+        sum += share * seen(e, seen_from(from, b));
         taken += share;
     }
     // Things that stand before each other take no more than the hemisphere.

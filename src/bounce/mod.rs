@@ -18,6 +18,7 @@ use crate::bake::links::{RUN_BITS, RUNS, Runs, WHOLE_SHARE};
 use crate::bake::surfaces::Links;
 use crate::error::Result;
 use crate::gpu::{Access, Bind, Buffer, BufferKind, Commands, ComputePipeline, Device, TexelView};
+use crate::layout::CLUSTER_VERTICES;
 use crate::lists::far::{FarRun, FarRuns};
 use crate::lists::incremental::ClusterLists;
 use crate::merge::MergeInputs;
@@ -69,8 +70,8 @@ const MOST_ENTRIES: u64 = 1 << 24;
 /// Links of all vertices of a scene, by the places of entities' vertices in the buffers of light.
 #[derive(Default)]
 pub struct Linked {
-    /// First vertex and number of vertices of every run.
-    runs: Vec<[u32; 2]>,
+    run_count: usize,
+    blocks: Vec<RunBlock>,
     /// A third of the triangles around each vertex.
     areas: Vec<f32>,
     /// For each vertex its first link, and the number of its links below its entity.
@@ -97,12 +98,18 @@ impl Linked {
             ..Linked::default()
         };
         for members in rigid {
-            let base = linked.runs.len() as u32;
+            let base = linked.run_count as u32;
             let runs = Runs::new(members.iter().map(|&member| entities[member].order.len()));
-            let run = |(member, first, count): (usize, usize, usize)| {
-                [(entities[members[member]].first + first) as u32, count as u32]
+            linked.run_count += runs.count() as usize;
+            let block = |(number, (member, first, count)): (u32, (usize, usize, usize))| {
+                let middle = runs.parts(number).start;
+                RunBlock {
+                    vertex_first: (entities[members[member]].first + first) as u32,
+                    vertex_count: count as u32,
+                    runs: [runs.parts(middle).start, middle, number].map(|run| base + run),
+                }
             };
-            linked.runs.extend(runs.all().map(run));
+            linked.blocks.extend(runs.of_size(RUNS.len() - 1).map(block));
             for &member in members {
                 linked.add(member, &entities[member], base);
             }
@@ -110,10 +117,10 @@ impl Linked {
             if members.iter().all(|&member| entities[member].rests) {
                 linked.see_from_afar(entities, members, &runs, base);
             }
-            linked.far.runs.resize(linked.runs.len(), FarRun::default());
+            linked.far.runs.resize(linked.run_count, FarRun::default());
         }
-        if linked.runs.len() >= 1 << RUN_BITS {
-            log::warn!("light does not bounce: {} runs of vertices are more than links number", linked.runs.len());
+        if linked.run_count >= 1 << RUN_BITS {
+            log::warn!("light does not bounce: {} runs of vertices are more than links number", linked.run_count);
             return None;
         }
         if linked.links.is_empty() && !linked.meets() {
@@ -177,6 +184,16 @@ impl Linked {
     }
 }
 
+/// A run of the largest size, at most 512 vertices, and the smaller ones that it consists of.
+#[repr(C)]
+#[derive(Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]
+struct RunBlock {
+    vertex_first: u32,
+    vertex_count: u32,
+    /// Its first run of each size of [`RUNS`].
+    runs: [u32; RUNS.len()],
+}
+
 /// An entity whose vertices may have links.
 pub struct LinkedEntity<'e> {
     pub mesh: &'e Mesh,
@@ -212,12 +229,14 @@ pub struct Bounce {
     texels: bool,
     /// Whether the scene has sharp lights.
     soft: bool,
-    runs: Buffer,
+    blocks: Buffer,
+    block_count: u32,
     areas: Buffer,
     ranges: Buffer,
     links: Buffer,
     run_light: Buffer,
-    counts: [u32; 2],
+    run_count: u32,
+    vertex_count: u32,
     movers: Option<Movers>,
     /// Steps after which more bounces are not seen.
     steps: u32,
@@ -245,10 +264,11 @@ impl Bounce {
         merge: MergePermutation,
         self_cells: Option<&Buffer>,
     ) -> Result<Self> {
-        let counts = [linked.runs.len() as u32, linked.ranges.len() as u32];
-        let run_light = Buffer::new(device, "light of runs", BufferKind::Device, 16 * u64::from(counts[0]))?;
+        let run_count = linked.run_count as u32;
+        let vertex_count = linked.ranges.len() as u32;
+        let run_light = Buffer::new(device, "light of runs", BufferKind::Device, 16 * u64::from(run_count))?;
         let fits = TexelView::fits(device, vk::Format::R32_UINT, 4 * linked.links.len() as u64)
-            && TexelView::fits(device, vk::Format::R32G32B32A32_SFLOAT, 16 * u64::from(counts[1]));
+            && TexelView::fits(device, vk::Format::R32G32B32A32_SFLOAT, 16 * u64::from(vertex_count));
         let texels = merge.reads_texels() && fits;
         let meets = linked.meets();
         let Linked { surfaces, far, ranges, .. } = linked;
@@ -262,13 +282,15 @@ impl Bounce {
             bounce,
             texels,
             soft,
-            runs: Buffer::with_data(device, "runs", &linked.runs)?,
+            block_count: linked.blocks.len() as u32,
+            blocks: Buffer::with_data(device, "runs", &linked.blocks)?,
             areas: Buffer::with_data(device, "areas of vertices", &linked.areas)?,
             ranges: Buffer::with_data(device, "ranges of links", &ranges)?,
             links: Buffer::with_data(device, "links", &linked.links)?,
             run_light,
             steps: MOST,
-            counts,
+            run_count,
+            vertex_count,
             movers: meets.then(movers).transpose()?,
         })
     }
@@ -320,22 +342,23 @@ impl Bounce {
     pub fn record<'r>(&'r self, commands: &mut Commands<'r>, work: &BounceWork<'r>) -> Result<()> {
         let BounceWork { entities, light, steps, .. } = work;
         let quads = vk::Format::R32G32B32A32_SFLOAT;
+        let words = vk::Format::R32_UINT;
         let written = |commands: &mut Commands<'r>| {
             commands.barrier(Access::ComputeWrite, Access::ComputeRead);
             commands.barrier(Access::ComputeWrite, Access::ComputeSampled);
         };
-        let [run_count, vertex_count] = self.counts;
+        let vertex_count = self.vertex_count;
         let alone = steps.saturating_sub(MET);
         for step in 0..*steps {
             let from = if step == 0 { light.direct } else { light.radiosity };
             let resources = [
-                Bind::Buffer(&self.runs),
-                Bind::Buffer(&self.areas),
+                Bind::Buffer(&self.blocks),
+                read(self.texels, &self.areas, words)?,
                 read(self.texels, from, quads)?,
                 Bind::Buffer(&self.run_light),
-                light.lamps.map_or(Bind::None, Bind::Buffer),
+                light.lamps.map_or(Ok(Bind::None), |shares| read(self.texels, shares, words))?,
             ];
-            commands.dispatch(&self.means, &resources, &run_count, [run_count, 1, 1])?;
+            commands.dispatch(&self.means, &resources, &(), [CLUSTER_VERTICES * self.block_count, 1, 1])?;
             written(commands);
             let met = self.movers.as_ref().zip(work.met.as_ref());
             if let Some((movers, (inputs, self_cells))) = met.filter(|_| step == alone) {
@@ -343,16 +366,18 @@ impl Bounce {
                 written(commands);
             }
             let mut resources = vec![
-                Bind::Buffer(entities),
-                Bind::Buffer(&self.ranges),
+                read(self.texels, entities, quads)?,
+                read(self.texels, &self.ranges, vk::Format::R32G32_UINT)?,
                 read(self.texels, &self.links, vk::Format::R32_UINT)?,
                 read(self.texels, &self.run_light, quads)?,
-                Bind::Buffer(light.direct),
+                read(self.texels, light.direct, quads)?,
                 Bind::Buffer(light.radiosity),
-                light.soft_direct.map_or(Bind::None, Bind::Buffer),
+                light.soft_direct.map_or(Ok(Bind::None), |light| read(self.texels, light, quads))?,
                 light.soft.map_or(Bind::None, Bind::Buffer),
             ];
-            resources.extend(self.movers.as_ref().map(|movers| Bind::Buffer(&movers.incoming)));
+            if let Some(movers) = &self.movers {
+                resources.push(read(self.texels, &movers.incoming, quads)?);
+            }
             // Pixels read the last step alone.
             let push = [vertex_count, u32::from(step + 1 == *steps), u32::from(step >= alone)];
             commands.dispatch(&self.bounce, &resources, &push, [vertex_count, 1, 1])?;

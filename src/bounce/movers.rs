@@ -124,6 +124,7 @@ impl Surfaces {
 /// The passes on a device.
 pub(super) struct Movers {
     outgoing: ComputePipeline,
+    distant: ComputePipeline,
     movers: ComputePipeline,
     permutation: MergePermutation,
     /// Whether any mesh shadows itself.
@@ -140,6 +141,10 @@ pub(super) struct Movers {
     pub clusters: Upload,
     pub entries: Upload,
     pub cluster_count: u32,
+    pub pairs: Upload,
+    pub pair_count: u32,
+    /// Two quads a pair: a sphere, its light and weight.
+    spheres: Upload,
 }
 
 fn pipelines(
@@ -147,9 +152,13 @@ fn pipelines(
     library: &Library,
     permutation: &MergePermutation,
     self_shadows: bool,
-) -> Result<[ComputePipeline; 2]> {
+) -> Result<[ComputePipeline; 3]> {
     let pipeline = |name: &str, row: ShaderPermutation| ComputePipeline::new(device, name, &library.shader(&row)?);
-    Ok([pipeline("outgoing", outgoing_row(permutation))?, pipeline("movers", movers_row(permutation, self_shadows))?])
+    Ok([
+        pipeline("outgoing", outgoing_row(permutation))?,
+        pipeline("distant movers", distant_row(permutation))?,
+        pipeline("movers", movers_row(permutation, self_shadows))?,
+    ])
 }
 
 impl Movers {
@@ -161,7 +170,7 @@ impl Movers {
         self_shadows: bool,
         vertices: usize,
     ) -> Result<Self> {
-        let [outgoing, met] = pipelines(device, library, &permutation, self_shadows)?;
+        let [outgoing, distant, movers] = pipelines(device, library, &permutation, self_shadows)?;
         // No buffer is empty.
         let buffer = |name: &str, quads: &[[f32; 4]]| match quads {
             [] => Buffer::zeros(device, name, 16),
@@ -174,7 +183,8 @@ impl Movers {
         let far_data: Vec<[f32; 4]> = far.runs.iter().flat_map(quads).collect();
         Ok(Movers {
             outgoing,
-            movers: met,
+            distant,
+            movers,
             self_shadows,
             far_data: buffer("far runs", &far_data)?,
             movers_data: Upload::new(device, "movers", size_of_val(&surfaces.movers[..]).max(32) as u64)?,
@@ -184,6 +194,9 @@ impl Movers {
             clusters: Upload::new(device, "clusters of movers", 64)?,
             entries: Upload::new(device, "lists of movers", 64)?,
             cluster_count: 0,
+            pairs: Upload::new(device, "distant movers", 64)?,
+            pair_count: 0,
+            spheres: Upload::on_device(device, "distant movers as spheres", 64)?,
             permutation,
             surfaces,
             far,
@@ -191,7 +204,7 @@ impl Movers {
     }
 
     pub fn rebuild(&mut self, device: &Arc<Device>, library: &Library) -> Result<()> {
-        [self.outgoing, self.movers] = pipelines(device, library, &self.permutation, self.self_shadows)?;
+        [self.outgoing, self.distant, self.movers] = pipelines(device, library, &self.permutation, self.self_shadows)?;
         Ok(())
     }
 
@@ -200,15 +213,18 @@ impl Movers {
         let Surfaces { reflects, rests, movers, .. } = &mut self.surfaces;
         let of =
             Reflectors { movers: movers.iter().map(|mover| mover.entity as usize), reflects, rests, far: &self.far };
-        let (clusters, entries, cuts) = lists.reflectors(&of);
-        for (mover, [first, count]) in movers.iter_mut().zip(cuts) {
+        let found = lists.reflectors(&of);
+        for (mover, [first, count]) in movers.iter_mut().zip(found.cuts) {
             mover.far_first = first;
             mover.far_count = count;
         }
         self.movers_data.write(movers)?;
-        self.cluster_count = clusters.len() as u32;
-        self.clusters.write(&clusters)?;
-        self.entries.write(&entries)
+        self.cluster_count = found.clusters.len() as u32;
+        self.clusters.write(&found.clusters)?;
+        self.entries.write(&found.entries)?;
+        self.pair_count = found.pairs.len() as u32;
+        self.pairs.write(&found.pairs)?;
+        self.spheres.reserve(32 * found.pairs.len() as u64)
     }
 
     /// Which variant its inputs are to be read by.
@@ -240,16 +256,33 @@ impl Movers {
         let resources: Vec<Bind<'r>> = shared()?.into_iter().chain(of_outgoing).collect();
         let count = self.surfaces.movers.len() as u32 * MOST_RUNS as u32;
         commands.dispatch(&self.outgoing, &resources, &u32::from(bounced), [count, 1, 1])?;
-        commands.barrier(Access::ComputeWrite, Access::ComputeRead);
-        commands.barrier(Access::ComputeWrite, Access::ComputeSampled);
+        let written = |commands: &mut Commands<'r>| {
+            commands.barrier(Access::ComputeWrite, Access::ComputeRead);
+            commands.barrier(Access::ComputeWrite, Access::ComputeSampled);
+        };
+        written(commands);
+        if self.pair_count > 0 {
+            let resources = [
+                inputs.entities.bind(),
+                read(texels, &self.entries, vk::Format::R32_UINT)?,
+                read(texels, &self.clusters, vk::Format::R32G32_UINT)?,
+                inputs.fields.bind(),
+                read(texels, &self.light, quads)?,
+                read(texels, &self.pairs, vk::Format::R32G32_UINT)?,
+                Bind::Buffer(&self.spheres),
+            ];
+            commands.dispatch(&self.distant, &resources, &self.pair_count, [self.pair_count, 1, 1])?;
+            written(commands);
+        }
         let of_movers = [
-            Bind::Buffer(&self.clusters),
+            read(texels, &self.clusters, vk::Format::R32G32_UINT)?,
             inputs.fields.bind(),
             inputs.transfers.bind(),
             inputs.vertices.bind(),
             read(texels, &self.light, quads)?,
             Bind::Buffer(&self.incoming),
             self_cells.map_or(Ok(Bind::None), |cells| read(texels, cells, vk::Format::R32G32_UINT))?,
+            read(texels, &self.spheres, quads)?,
         ];
         let resources: Vec<Bind<'r>> = shared()?.into_iter().chain(of_movers).collect();
         commands.dispatch(&self.movers, &resources, &(), [self.cluster_count * CLUSTER_VERTICES, 1, 1])
@@ -258,6 +291,10 @@ impl Movers {
 
 pub fn outgoing_row(permutation: &MergePermutation) -> ShaderPermutation {
     far_row(permutation, "outgoing.comp").define("RUNS", MOST_RUNS as u32)
+}
+
+pub fn distant_row(permutation: &MergePermutation) -> ShaderPermutation {
+    far_row(permutation, "distant.comp")
 }
 
 pub fn movers_row(permutation: &MergePermutation, self_shadows: bool) -> ShaderPermutation {

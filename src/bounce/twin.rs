@@ -1,15 +1,15 @@
 //! The CPU twin of the passes in f64, from the same links, lists and fields.
 
 use super::movers::{Movers, OUTGOING, OVER, SMOOTH};
-use super::{Bounce, MET};
-use crate::bake::links::{RUN_BITS, WHOLE_SHARE};
+use super::{Bounce, MET, RunBlock};
+use crate::bake::links::{RUN_BITS, RUNS, WHOLE_SHARE};
 use crate::error::Result;
 use crate::field::self_visibility;
 use crate::layout::Cluster;
 use crate::lists::incremental::CUT_HEADER;
 use crate::lists::skip::Skip;
 use crate::merge::twin::{Cone, MergeObject};
-use crate::sh::basis::{MAX_COEFFICIENTS, evaluate};
+use crate::sh::basis::{MAX_COEFFICIENTS, Y00, evaluate};
 use crate::sh::lobe::clamped_cosine;
 use glam::{DVec3, Vec3, Vec4, Vec4Swizzles};
 use rayon::prelude::*;
@@ -64,9 +64,10 @@ impl Bounce {
 
     /// What the passes read of links, in host memory.
     pub(super) fn download(&self) -> Result<HostLinks> {
-        let [run_count, vertex_count] = self.counts.map(|count| count as usize);
+        let vertex_count = self.vertex_count as usize;
         Ok(HostLinks {
-            runs: self.runs.download(run_count)?,
+            run_count: self.run_count as usize,
+            blocks: self.blocks.download(self.block_count as usize)?,
             areas: self.areas.download(vertex_count)?,
             ranges: self.ranges.download(vertex_count)?,
             links: self.links.download((self.links.size_bytes / 4) as usize)?,
@@ -76,7 +77,8 @@ impl Bounce {
 
 /// The links of all vertices, as [`super::Linked`] has them.
 pub(super) struct HostLinks {
-    runs: Vec<[u32; 2]>,
+    run_count: usize,
+    blocks: Vec<RunBlock>,
     areas: Vec<f32>,
     pub ranges: Vec<[u32; 2]>,
     links: Vec<u32>,
@@ -84,13 +86,18 @@ pub(super) struct HostLinks {
 
 impl HostLinks {
     /// Mean light of every run.
-    pub fn means<L: Copy + Sum + Mul<f64, Output = L> + Send + Sync>(&self, light: &[L]) -> Vec<L> {
-        let mean = |[first, count]: &[u32; 2]| {
-            let places = *first as usize..(first + count) as usize;
-            let whole: f64 = self.areas[places.clone()].iter().map(|area| f64::from(*area)).sum();
-            places.map(|v| light[v] * (f64::from(self.areas[v]) / whole.max(1e-30))).sum()
-        };
-        self.runs.par_iter().map(mean).collect()
+    pub fn means<L: Copy + Default + Sum + Mul<f64, Output = L>>(&self, light: &[L]) -> Vec<L> {
+        let mut means = vec![L::default(); self.run_count];
+        for block in &self.blocks {
+            let places: Vec<usize> = (block.vertex_first as usize..).take(block.vertex_count as usize).collect();
+            for (first, size) in block.runs.into_iter().zip(RUNS) {
+                for (mean, places) in means[first as usize..].iter_mut().zip(places.chunks(size)) {
+                    let whole: f64 = places.iter().map(|&v| f64::from(self.areas[v])).sum();
+                    *mean = places.iter().map(|&v| light[v] * (f64::from(self.areas[v]) / whole.max(1e-30))).sum();
+                }
+            }
+        }
+        means
     }
 
     /// First link, entity and number of links of every vertex.
@@ -117,6 +124,7 @@ impl Movers {
     ) -> Result<()> {
         let clusters: Vec<Cluster> = self.clusters.download(self.cluster_count as usize)?;
         let entries: Vec<u32> = self.entries.download((self.entries.size_bytes / 4) as usize)?;
+        let pairs: Vec<[u32; 2]> = self.pairs.download(self.pair_count as usize)?;
         let some = |first: u32, count: u32| &entries[first as usize..][..count as usize];
         let mut outgoing = vec![[(DVec3::ZERO, 0.0); OUTGOING]; input.objects.len()];
         for mover in &self.surfaces.movers {
@@ -141,8 +149,12 @@ impl Movers {
             let (header, list) = some(cluster.entry_first, cluster.entry_count).split_at(CUT_HEADER);
             let (near, list) = list.split_at(header[3] as usize);
             let (far, list) = list.split_at(header[4] as usize);
-            let middle = Vec3::from(std::array::from_fn(|i| f32::from_bits(header[i]))).as_dvec3();
-            let far = self.far_light(far, of_runs, receiver.centre + middle);
+            let middle = receiver.centre + Vec3::from(std::array::from_fn(|i| f32::from_bits(header[i]))).as_dvec3();
+            let far = self.far_light(far, of_runs, middle);
+            let pairs = pairs[header[5] as usize..][..header[6] as usize].iter();
+            let spheres: Vec<Sphere> = pairs
+                .map(|[_, packed]| self.sphere(*packed, &input.objects[number_of(*packed)], &outgoing, middle))
+                .collect();
             let of_vertex = |v: usize| {
                 let vertex = (input.vertex)(cluster, v);
                 let normal = receiver.rotation * vertex.normal;
@@ -153,8 +165,17 @@ impl Movers {
                 let at_rest = within_hemisphere((near + seen_far.max(DVec3::ZERO), near_share + far_share.max(0.0)));
                 let mut sum = DVec3::ZERO;
                 let mut taken = 0.0;
-                for &entity in list {
-                    let object = &input.objects[entity as usize];
+                for sphere in &spheres {
+                    let cone = Cone::new(sphere.centre, sphere.radius_m, vertex.position);
+                    let sine = (sphere.radius_m / cone.distance).min(1.0);
+                    let share = sphere.weight * sphere_share(sine, normal.dot(cone.toward));
+                    let share = share * own_visible(&vertex, receiver, &cone, sphere.radius_m);
+                    sum += share * sphere.light;
+                    taken += share;
+                }
+                for &packed in list {
+                    let entity = number_of(packed);
+                    let object = &input.objects[entity];
                     let cone = Cone::new(object.centre, object.radius_m, vertex.position);
                     let to_object = object.rotation.inverse();
                     let from = to_object * (vertex.position - object.centre) / object.radius_m;
@@ -165,12 +186,8 @@ impl Movers {
                     let share: f64 = blocked.iter().zip(&cosine).map(|(b, c)| b * c).sum();
                     let own = own_visible(&vertex, receiver, &cone, object.radius_m);
                     let share = share * cone.above_horizon(normal, input.skip) * object.opacity / PI * own;
-                    let share = share.max(0.0);
-                    let middle = match field.header.bands {
-                        1 => from,
-                        _ => DVec3::new(blocked[3], blocked[1], -blocked[2]),
-                    };
-                    sum += share * seen(&outgoing[entity as usize], middle.normalize_or_zero());
+                    let share = weight_of(packed) * share.max(0.0);
+                    sum += share * seen(&outgoing[entity], seen_from(from, field.header.bands, &blocked));
                     taken += share;
                 }
                 let scale = 1.0 / f64::max(taken, 1.0);
@@ -183,6 +200,29 @@ impl Movers {
             incoming[cluster.radiosity_first as usize..][..found.len()].copy_from_slice(&found);
         }
         Ok(())
+    }
+
+    /// What looks from the middle of a cluster as a mover does.
+    fn sphere(
+        &self,
+        packed: u32,
+        object: &MergeObject<'_>,
+        outgoing: &[[(DVec3, f64); OUTGOING]],
+        middle: DVec3,
+    ) -> Sphere {
+        let to = object.centre - middle;
+        let from = object.rotation.inverse() * -to / object.radius_m;
+        let field = object.blocked.expect("what reflects has an occlusion field");
+        let mut blocked = [0.0; MAX_COEFFICIENTS];
+        field.lookup(from, 0, &mut blocked);
+        let direction = seen_from(from, field.header.bands, &blocked);
+        let cosine = (1.0 - blocked[0] / (2.0 * PI * Y00)).clamp(0.0, 1.0);
+        Sphere {
+            centre: middle - to.length() * (object.rotation * direction),
+            radius_m: (1.0 - cosine * cosine).sqrt() * to.length(),
+            light: seen(&outgoing[number_of(packed)], direction),
+            weight: object.opacity * weight_of(packed),
+        }
     }
 
     /// Sums of shares of the cosine-weighted hemisphere times radiosity, and of the shares.
@@ -221,14 +261,36 @@ impl Movers {
     }
 
     fn seen_run(&self, entry: u32, place: DVec3) -> SeenRun {
-        let number = (entry & ((1 << RUN_BITS) - 1)) as usize;
+        let number = number_of(entry);
         let run = &self.far.runs[number];
         let to = run.middle.as_dvec3() - place;
         let area = f64::from(run.across.length());
         let axis = run.across.as_dvec3() / area.max(1e-20);
-        let weight = f64::from(entry >> RUN_BITS) / f64::from(WHOLE_SHARE);
-        SeenRun { number, weight, to, axis, area, height: (-to.dot(axis)).max(0.0) }
+        SeenRun { number, weight: weight_of(entry), to, axis, area, height: (-to.dot(axis)).max(0.0) }
     }
+}
+
+/// Number of a run or an entity below a weight.
+fn number_of(packed: u32) -> usize {
+    (packed & ((1 << RUN_BITS) - 1)) as usize
+}
+
+fn weight_of(packed: u32) -> f64 {
+    f64::from(packed >> RUN_BITS) / f64::from(WHOLE_SHARE)
+}
+
+/// A mover far away.
+struct Sphere {
+    centre: DVec3,
+    radius_m: f64,
+    light: DVec3,
+    weight: f64,
+}
+
+/// Share of the cosine-weighted hemisphere that a sphere takes.
+fn sphere_share(sine: f64, cosine: f64) -> f64 {
+    let above = (cosine + sine).clamp(0.0, 2.0 * sine);
+    sine * sine * cosine.max(above * above / (4.0 * sine).max(1e-20))
 }
 
 /// A run at rest, seen from a place.
@@ -260,6 +322,12 @@ fn own_visible(vertex: &TwinVertex<'_>, receiver: &MergeObject<'_>, cone: &Cone,
     let seen: f64 = transfer.iter().zip(&basis).map(|(t, y)| f64::from(*t) * y).sum();
     let open: f64 = clamped_cosine(bands, vertex.normal).iter().zip(&basis).map(|(c, y)| c * y).sum();
     (seen / open.max(0.05)).clamp(0.0, 1.0)
+}
+
+/// Against the middle of the directions that a mover blocks, in its frame, `from` where the viewer stands.
+fn seen_from(from: DVec3, bands: usize, blocked: &[f64; MAX_COEFFICIENTS]) -> DVec3 {
+    let middle = if bands == 1 { from } else { DVec3::new(blocked[3], blocked[1], -blocked[2]) };
+    middle.normalize_or_zero()
 }
 
 /// Mean radiosity of those surfaces of a mover that are seen along a direction, which comes from the mover in its frame.

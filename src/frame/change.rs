@@ -90,7 +90,7 @@ impl Frame {
         {
             reflections.rebuild(&self.library)?;
         }
-        if ["runs.comp", "bounce.comp", "outgoing.comp", "movers.comp"].into_iter().any(uses)
+        if ["runs.comp", "bounce.comp", "outgoing.comp", "distant.comp", "movers.comp"].into_iter().any(uses)
             && let Some(bounce) = &mut self.bounce
         {
             bounce.rebuild(&self.device, &self.library)?;

@@ -254,24 +254,37 @@ impl Buffer {
 pub struct Upload {
     buffers: [Buffer; FLIGHTS],
     last: usize,
+    kind: BufferKind,
 }
 
 impl Upload {
     pub fn new(device: &Arc<Device>, name: &str, size_bytes: u64) -> Result<Self> {
         let one = || Buffer::new(device, name, BufferKind::Upload, size_bytes);
-        Ok(Upload { buffers: [one()?, one()?], last: 0 })
+        Ok(Upload { buffers: [one()?, one()?], last: 0, kind: BufferKind::Upload })
     }
 
-    /// Writes the whole content. A buffer that is too small is replaced by one that is half as large again as needed,
-    /// so that a slowly growing scene does not reallocate in each frame.
+    /// One that the device alone writes and reads, of a size that changes from frame to frame.
+    pub fn on_device(device: &Arc<Device>, name: &str, size_bytes: u64) -> Result<Self> {
+        let one = || Buffer::new(device, name, BufferKind::Device, size_bytes);
+        Ok(Upload { buffers: [one()?, one()?], last: 0, kind: BufferKind::Device })
+    }
+
+    /// Writes the whole content.
     pub fn write<T: Pod>(&mut self, data: &[T]) -> Result<()> {
+        self.reserve(size_of_val(data) as u64)?;
+        self.buffers[self.last].write(0, data);
+        Ok(())
+    }
+
+    /// Takes the next flight's buffer. One that is too small is replaced by one that is half as large again as needed, so
+    /// that a slowly growing scene does not reallocate in each frame.
+    pub fn reserve(&mut self, size_bytes: u64) -> Result<()> {
         self.last = (self.last + 1) % FLIGHTS;
         let buffer = &mut self.buffers[self.last];
-        let size = size_of_val(data) as u64;
-        if size > buffer.size_bytes {
-            *buffer = Buffer::new(&buffer.device().clone(), &buffer.name.clone(), BufferKind::Upload, size + size / 2)?;
+        if size_bytes > buffer.size_bytes {
+            let size = size_bytes + size_bytes / 2;
+            *buffer = Buffer::new(&buffer.device().clone(), &buffer.name.clone(), self.kind, size)?;
         }
-        buffer.write(0, data);
         Ok(())
     }
 }

@@ -17,6 +17,11 @@ const FADE: f32 = 0.85;
 /// A run nearer to a cluster than so many of the cluster's radii is seen by each of its vertices, and from the second
 /// on by its middle alone.
 const NEAR: [f32; 2] = [1.5, 2.0];
+/// A mover is seen from the middle of a cluster where its bounding sphere is farther off than so many of the cluster's
+/// radii, and its centre than so many of its own.
+const DISTANT_CLUSTERS: [f32; 2] = [1.0, 1.5];
+const DISTANT_RADII: [f32; 2] = [1.5, 2.0];
+
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct FarRun {
     /// Middle, world, metres, and how far its vertices lie from there.
@@ -69,17 +74,27 @@ impl FarRuns {
         let opened = if run.parts.is_empty() { 0.0 } else { fade(size, [FADE, 1.0]) };
         if run.area_m2 > 0.0 {
             let near = 1.0 - fade(gap / radius_m, NEAR);
-            let push = |out: &mut Vec<u32>, weight: f32| {
-                let packed = (weight * WHOLE_SHARE as f32).round() as u32;
-                out.extend((packed > 0).then_some(packed << RUN_BITS | number));
-            };
-            push(&mut out.near, weight * (1.0 - opened) * near);
-            push(&mut out.far, weight * (1.0 - opened) * (1.0 - near));
+            out.near.extend(pack(weight * (1.0 - opened) * near, number));
+            out.far.extend(pack(weight * (1.0 - opened) * (1.0 - near), number));
         }
         if opened > 0.0 {
             run.parts.clone().for_each(|part| self.cut_below(part, weight * opened, eye, out));
         }
     }
+}
+
+/// A number below a weight of 0 to 1, as links are packed; `None` where it has none.
+pub fn pack(weight: f32, number: u32) -> Option<u32> {
+    let packed = (weight * WHOLE_SHARE as f32).round() as u32;
+    (packed > 0).then_some(packed << RUN_BITS | number)
+}
+
+/// How much of a mover, whose centre is `distance_m` from the middle of a cluster, is seen from there, and not from each
+/// vertex: 0 to 1.
+pub fn distant(distance_m: f64, radius_m: f64, cluster_radius_m: f64) -> f32 {
+    let gap = (distance_m - radius_m) / cluster_radius_m.max(1e-15);
+    let clear = fade(gap as f32, DISTANT_CLUSTERS);
+    clear * fade((distance_m / radius_m) as f32, DISTANT_RADII)
 }
 
 fn fade(x: f32, [from, to]: [f32; 2]) -> f32 {

@@ -9,7 +9,7 @@
 //! seen, or once nothing moves any more.
 
 use crate::layout::{self, ListEntry, OWN_MAPS};
-use crate::lists::far::{Cut, FarRuns};
+use crate::lists::far::{self, Cut, FarRuns};
 use crate::lists::gather::{self, Candidates, ClusterBounds, GROUP_CLUSTERS, SceneBounds};
 use crate::lists::scope::Scope;
 use crate::lists::sight::{Sight, TriangleRun};
@@ -74,7 +74,7 @@ pub(crate) struct ClusterLists {
 }
 
 /// Words before the runs of a list of [`ClusterLists::reflectors`].
-pub(crate) const CUT_HEADER: usize = 5;
+pub(crate) const CUT_HEADER: usize = 7;
 
 /// From which entities light bounces onto those of other groups.
 pub(crate) struct Reflectors<'r, I> {
@@ -85,6 +85,26 @@ pub(crate) struct Reflectors<'r, I> {
     pub rests: &'r [bool],
     /// All that rests, as what moves sees it.
     pub far: &'r FarRuns,
+}
+
+/// What light bounces from onto all clusters: see [`ClusterLists::reflectors`].
+#[derive(Default)]
+pub(crate) struct Reflected {
+    /// The clusters, which know their place among the entries.
+    pub clusters: Vec<layout::Cluster>,
+    pub entries: Vec<u32>,
+    /// A cluster and an entity below its weight, for each that is seen from afar.
+    pub pairs: Vec<[u32; 2]>,
+    /// The cuts of whole entities that move: first entry and how many.
+    pub cuts: Vec<[u32; 2]>,
+}
+
+/// What one cluster sees of others.
+struct Sighted {
+    middle: Vec3,
+    cut: Cut,
+    near: Vec<u32>,
+    distant: Vec<u32>,
 }
 
 /// What a frame did about its clusters.
@@ -279,16 +299,13 @@ impl ClusterLists {
         (clusters, all)
     }
 
-    /// What light bounces from onto each cluster at the last update's time: clusters that know their place among the
-    /// entries, and the entries. A list begins with [`CUT_HEADER`] words: the middle of the cluster in the world,
-    /// from its entity's centre, and how many near and far runs of what rests it sees, if it moves. Those follow, and then
-    /// entities.
+    /// What light bounces from onto each cluster at the last update's time. A list begins with [`CUT_HEADER`] words: the
+    /// middle of the cluster in the world, from its entity's centre; how many near and far runs of what rests it sees, if
+    /// it moves; its first pair and their number. The runs follow, and then entities nearby. All entries but those of the
+    /// header are below their weights ([`RUN_BITS`]).
     ///
-    /// The cuts of whole entities that move, of those in `of.movers`, come last: first entry and how many.
-    pub fn reflectors(
-        &self,
-        of: &Reflectors<'_, impl Iterator<Item = usize> + Clone + Sync>,
-    ) -> (Vec<layout::Cluster>, Vec<u32>, Vec<[u32; 2]>) {
+    /// The cuts of whole entities that move, of those in `of.movers`, come last.
+    pub fn reflectors(&self, of: &Reflectors<'_, impl Iterator<Item = usize> + Clone + Sync>) -> Reflected {
         let State { scene_bounds, entities, .. } = self.now();
         let of_group = |group: &WatchedGroup| {
             let receiver = group.receiver;
@@ -307,34 +324,42 @@ impl ClusterLists {
                 let scope = Scope::new(scene_bounds, receiver, entity, &self.bounds[cluster], &[]);
                 let (centre, radius_m) = scope.sphere();
                 let cut = if rests { Cut::default() } else { of.far.cut(centre.as_vec3(), radius_m as f32) };
-                let [x, y, z] = (centre - scene_bounds.entities[receiver].centre).as_vec3().to_array();
-                let mut entries = vec![x.to_bits(), y.to_bits(), z.to_bits()];
-                entries.extend([cut.near.len(), cut.far.len()].map(|count| count as u32));
-                entries.extend(cut.near.iter().chain(&cut.far));
-                entries.extend(candidates.iter().copied().filter(|&j| scope.meets(j as usize)));
-                entries
+                let middle = (centre - scene_bounds.entities[receiver].centre).as_vec3();
+                let mut sighted = Sighted { middle, cut, near: Vec::new(), distant: Vec::new() };
+                for &j in candidates.iter().filter(|&&j| scope.meets(j as usize)) {
+                    let bounds = &scene_bounds.entities[j as usize];
+                    let distant = far::distant(bounds.centre.distance(centre), bounds.radius_m, radius_m);
+                    sighted.distant.extend(far::pack(distant, j));
+                    sighted.near.extend(far::pack(1.0 - distant, j));
+                }
+                sighted
             };
             group.clusters.clone().map(of_cluster).collect::<Vec<_>>()
         };
-        let found: Vec<Vec<Vec<u32>>> = self.groups.par_iter().map(of_group).collect();
-        let mut clusters = self.clusters.clone();
-        let mut all = Vec::new();
-        for (cluster, entries) in clusters.iter_mut().zip(found.into_iter().flatten()) {
-            cluster.entry_first = all.len() as u32;
-            cluster.entry_count = entries.len() as u32;
-            all.extend(entries);
+        let found: Vec<Vec<Sighted>> = self.groups.par_iter().map(of_group).collect();
+        let found: Vec<&Sighted> = found.iter().flatten().collect();
+        let mut all = Reflected { clusters: self.clusters.clone(), ..Reflected::default() };
+        for (number, sighted) in found.into_iter().enumerate() {
+            let Sighted { middle, cut, near, distant } = sighted;
+            let entry_first = all.entries.len() as u32;
+            let counts = [cut.near.len(), cut.far.len(), all.pairs.len(), distant.len()].map(|count| count as u32);
+            all.entries.extend(middle.to_array().map(f32::to_bits));
+            all.entries.extend(counts);
+            all.entries.extend(cut.near.iter().chain(&cut.far).chain(near));
+            all.pairs.extend(distant.iter().map(|packed| [number as u32, *packed]));
+            let entry_count = all.entries.len() as u32 - entry_first;
+            all.clusters[number] = layout::Cluster { entry_first, entry_count, ..all.clusters[number] };
         }
-        let cut = |entity: usize| {
-            let [x, y, z, radius_m] = scene_bounds.spheres[entity];
-            let first = all.len();
+        for entity in of.movers.clone() {
+            let first = all.entries.len();
             if !of.rests[entity] {
+                let [x, y, z, radius_m] = scene_bounds.spheres[entity];
                 let Cut { near, far } = of.far.cut(Vec3::new(x, y, z), radius_m);
-                all.extend([near, far].concat());
+                all.entries.extend([near, far].concat());
             }
-            [first, all.len() - first].map(|place| place as u32)
-        };
-        let cuts = of.movers.clone().map(cut).collect();
-        (clusters, all, cuts)
+            all.cuts.push([first, all.entries.len() - first].map(|place| place as u32));
+        }
+        all
     }
 
     /// The chains of sharp lights of all clusters of a receiver at the last update's time, for what lies as far as

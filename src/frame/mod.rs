@@ -30,7 +30,7 @@ use crate::bounce::{Bounce, BounceWork, Bounces, Linked, LinkedEntity};
 use crate::draw::{PictureLights, Shading};
 use crate::error::Result;
 use crate::gloss::Reflections;
-use crate::gpu::{Buffer, Commands, Device, Timing};
+use crate::gpu::{self, Buffer, Commands, Device, Timing};
 use crate::layout::{CLUSTER_FORMAT, ENTRY_FORMAT, QUAD_FORMAT};
 use crate::lists::incremental::{ClusterLists, Merged};
 use crate::merge::calibrate;
@@ -139,7 +139,8 @@ impl Frame {
         if sharp.is_some() {
             radiosity.keep_soft()?;
         }
-        let mut lists = ClusterLists::default();
+        let threads = if device.info.is_software() { gpu::cores() } else { 1 };
+        let mut lists = ClusterLists::new(threads);
         for (index, _) in scene.entities.iter().enumerate().filter(|(_, entity)| entity.receives) {
             lists.add(
                 index,

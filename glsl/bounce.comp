@@ -11,7 +11,7 @@ READ_UVEC2(1, Ranges, ranges, range_at) // first link; how many, and above them 
 READ_UINT(2, Links, links, link_at)
 READ_VEC4(3, RunLight, run_light, run_light_at)
 READ_VEC4(4, Direct, direct, direct_at)
-layout(std430, binding = 5) writeonly buffer Radiosity { vec4 radiosity[]; };
+layout(std430, binding = 5) buffer Radiosity { vec4 radiosity[]; };
 #if SOFT
 // The same without the light of sharp lights, for pixels that evaluate them.
 READ_VEC4(6, SoftDirect, soft_direct, soft_direct_at)
@@ -21,7 +21,11 @@ layout(std430, binding = 7) writeonly buffer Soft { vec4 soft[]; };
 // Of other groups: share of the view times radiosity, and the share that they take.
 READ_VEC4(8, Incoming, incoming, incoming_at)
 #endif
-layout(push_constant) uniform Push { uint count; uint last; uint meets; } push;
+layout(push_constant) uniform Push {
+    vec3 gain; // so many times the change is added: src/bounce/relaxation.rs
+    uint count;
+    uint first, last, meets; // steps
+} push;
 
 void main() {
     uint i = gl_GlobalInvocationID.x;
@@ -43,7 +47,12 @@ void main() {
     }
 #endif
     vec4 bounced = vec4(PI * ENTITY(range.y >> 8).albedo * sum, 0.0); // albedo is over pi
-    radiosity[i] = direct_at(i) + bounced;
+    vec4 direct = direct_at(i);
+    if (push.gain != vec3(0.0)) {
+        vec4 before = push.first != 0 ? direct : radiosity[i];
+        bounced.rgb += push.gain * (direct + bounced - before).rgb;
+    }
+    radiosity[i] = direct + bounced;
 #if SOFT
     if (push.last != 0) {
         soft[i] = soft_direct_at(i) + bounced;

@@ -3,14 +3,15 @@
 //! A vertex has links to runs of neighbouring vertices that it sees ([`crate::bake::links`]); a run has the mean light
 //! that leaves its vertices. The two passes alternate, once a bounce: means of all runs, and for every vertex its direct
 //! light and albedo times the light along its links. That is Jacobi's iteration of the radiosity equation: each step adds
-//! a bounce.
+//! a bounce. Each adds more than its change, so that few steps bring all bounces ([`relaxation`]).
 //!
-//! Between groups light goes by [`movers`], in the last two steps, as it needs the light that those before bring. There
-//! are no more steps than are seen, which follows from the links and the albedos. Only fronts reflect. A lamp in
+//! Between groups light goes by [`movers`], in the last two steps, as it needs the light that those before bring. Only
+//! fronts reflect. A lamp in
 //! spherical harmonics inside a closed mesh lights nothing of it, as the mesh's transfer ends where its own far side
 //! blocks; a sharp one does.
 
 pub mod movers;
+mod relaxation;
 pub(crate) mod twin;
 
 use crate::asset::Mesh;
@@ -26,8 +27,9 @@ use crate::merge::variant::MergePermutation;
 use crate::scene::Placement;
 use crate::shaders::{Library, ShaderPermutation};
 use ash::vk;
-use glam::DVec3;
+use glam::{DVec3, Vec3};
 use movers::{Movers, Surfaces};
+use relaxation::Relaxation;
 use std::sync::Arc;
 
 /// How often light bounces.
@@ -40,29 +42,26 @@ pub enum Bounces {
     None,
     #[cfg_attr(feature = "cli", value(name = "1"))]
     One,
-    /// As many as are seen: at most eight.
+    /// All.
     #[default]
     All,
 }
 
 impl Bounces {
-    /// How many there may be.
+    /// How many a path of the reference may have, which ends by chance long before.
     pub fn most(self) -> u32 {
         match self {
             Bounces::None => 0,
             Bounces::One => 1,
-            Bounces::All => MOST,
+            Bounces::All => 64,
         }
     }
 }
 
-/// All bounces. In a closed room of albedo 0.7 they leave 0.7^8 of the light, 6 %, in an open one of the
-/// same 1 %.
-const MOST: u32 = 8;
-/// Light that further bounces would bring, where all vertices had a direct light of 1: the root of its mean square.
-const LEAST_CHANGE: f64 = 0.005;
-/// Steps with light from other groups, the last ones.
-const MET: u32 = 2;
+/// Neighbouring vertices that are lit alike where it is found how many steps are needed.
+const SPOT: u32 = 256;
+/// Error of light that goes between groups, where all vertices have a direct light of 1.
+const LEAVING_ERROR: f64 = 0.04;
 
 /// Entries that views have to hold for the lists of what moves: more than all clusters of a large scene have.
 const MOST_ENTRIES: u64 = 1 << 24;
@@ -184,6 +183,42 @@ impl Linked {
     }
 }
 
+impl Steps {
+    /// One or no bounce.
+    fn exactly(count: u32, meets: bool) -> Self {
+        Steps { gains: vec![[0.0; 3]; count as usize], alone: if meets { 0 } else { count } }
+    }
+
+    /// All bounces within groups.
+    fn within(all: &Relaxation) -> Self {
+        let gains = all.gains(all.steps).into_iter();
+        Steps { gains: gains.map(|gain| gain.as_vec3().to_array()).collect(), alone: all.steps as u32 }
+    }
+
+    /// All bounces: first those that bring the light that goes between groups, and then `count` in all or more. The last
+    /// adds nothing: of light that a surface has from other groups alone, it leaves all as it is.
+    fn between(alone: &Relaxation, count: usize) -> Self {
+        let met = count.saturating_sub(alone.steps + 1).max(1);
+        let gains = alone.gains(alone.steps).into_iter().chain(alone.gains(met)).chain([DVec3::ZERO]);
+        Steps { gains: gains.map(|gain| gain.as_vec3().to_array()).collect(), alone: alone.steps as u32 }
+    }
+
+    pub(crate) fn count(&self) -> u32 {
+        self.gains.len() as u32
+    }
+}
+
+/// What pass "bounce" is pushed.
+#[repr(C)]
+#[derive(Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]
+struct BouncePush {
+    gain: [f32; 3],
+    count: u32,
+    first: u32,
+    last: u32,
+    meets: u32,
+}
+
 /// A run of the largest size, at most 512 vertices, and the smaller ones that it consists of.
 #[repr(C)]
 #[derive(Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]
@@ -238,8 +273,16 @@ pub struct Bounce {
     run_count: u32,
     vertex_count: u32,
     movers: Option<Movers>,
-    /// Steps after which more bounces are not seen.
-    steps: u32,
+    steps: Steps,
+}
+
+/// Steps that bring bounces.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Steps {
+    /// What each adds, by channel: so many times the change that it brought. Zero is a bounce.
+    gains: Vec<[f32; 3]>,
+    /// Of these, those within groups alone, which come first.
+    alone: u32,
 }
 
 fn pipelines(
@@ -288,7 +331,7 @@ impl Bounce {
             ranges: Buffer::with_data(device, "ranges of links", &ranges)?,
             links: Buffer::with_data(device, "links", &linked.links)?,
             run_light,
-            steps: MOST,
+            steps: Steps::exactly(1, meets),
             run_count,
             vertex_count,
             movers: meets.then(movers).transpose()?,
@@ -304,28 +347,24 @@ impl Bounce {
     }
 
     /// Finds how many steps surfaces of these albedos need.
-    pub fn set_albedos(&mut self, albedos: &[f32]) -> Result<()> {
+    pub fn set_albedos(&mut self, albedos: &[Vec3]) -> Result<()> {
         let host = self.download()?;
-        let mut light = vec![1.0; host.ranges.len()];
-        let mut steps = 0;
-        let is_seen = |light: &[f64]| {
-            let squares: f64 = light.iter().map(|light| light * light).sum();
-            squares > LEAST_CHANGE * LEAST_CHANGE * light.len() as f64
-        };
-        while steps < MOST && is_seen(&light) {
-            let of_runs = host.means(&light);
-            let bounced = |(first, entity, count)| f64::from(albedos[entity]) * host.along(first, count, &of_runs);
-            light = host.vertices().map(bounced).collect();
-            steps += 1;
-        }
-        let least = if self.movers.is_some() { MET + 1 } else { 1 };
-        self.steps = steps.clamp(least, MOST);
+        // An even light, and one that comes in spots.
+        let even = vec![DVec3::ONE; self.vertex_count as usize];
+        let spots = (0..self.vertex_count).map(|v| DVec3::splat(if v / SPOT % 4 == 0 { 2.0 } else { 0.0 }));
+        let errors = relaxation::errors(&[even, spots.collect()].map(|light| host.bounces(light, albedos)));
+        let all = relaxation::within(relaxation::UNSEEN, &errors);
+        let alone = relaxation::within(LEAVING_ERROR, &errors);
+        self.steps = if self.movers.is_some() { Steps::between(&alone, all.steps) } else { Steps::within(&all) };
         Ok(())
     }
 
-    /// Steps for bounces: as many as are seen.
-    pub fn steps(&self, bounces: Bounces) -> u32 {
-        bounces.most().min(self.steps)
+    /// Steps for bounces.
+    pub fn steps(&self, bounces: Bounces) -> Steps {
+        match bounces {
+            Bounces::All => self.steps.clone(),
+            Bounces::None | Bounces::One => Steps::exactly(bounces.most(), self.movers.is_some()),
+        }
     }
 
     /// Prepares the lists of what moves for the lists' present time.
@@ -348,8 +387,8 @@ impl Bounce {
             commands.barrier(Access::ComputeWrite, Access::ComputeSampled);
         };
         let vertex_count = self.vertex_count;
-        let alone = steps.saturating_sub(MET);
-        for step in 0..*steps {
+        let count = steps.count();
+        for step in 0..count {
             let from = if step == 0 { light.direct } else { light.radiosity };
             let resources = [
                 Bind::Buffer(&self.blocks),
@@ -361,8 +400,8 @@ impl Bounce {
             commands.dispatch(&self.means, &resources, &(), [CLUSTER_VERTICES * self.block_count, 1, 1])?;
             written(commands);
             let met = self.movers.as_ref().zip(work.met.as_ref());
-            if let Some((movers, (inputs, self_cells))) = met.filter(|_| step == alone) {
-                movers.record(commands, inputs, *self_cells, &self.run_light, *steps > 1)?;
+            if let Some((movers, (inputs, self_cells))) = met.filter(|_| step == steps.alone) {
+                movers.record(commands, inputs, *self_cells, &self.run_light, count > 1)?;
                 written(commands);
             }
             let mut resources = vec![
@@ -378,10 +417,16 @@ impl Bounce {
             if let Some(movers) = &self.movers {
                 resources.push(read(self.texels, &movers.incoming, quads)?);
             }
-            // Pixels read the last step alone.
-            let push = [vertex_count, u32::from(step + 1 == *steps), u32::from(step >= alone)];
+            let push = BouncePush {
+                gain: steps.gains[step as usize],
+                count: vertex_count,
+                first: u32::from(step == 0),
+                // Pixels read the last step alone.
+                last: u32::from(step + 1 == count),
+                meets: u32::from(step >= steps.alone),
+            };
             commands.dispatch(&self.bounce, &resources, &push, [vertex_count, 1, 1])?;
-            if step + 1 < *steps {
+            if step + 1 < count {
                 written(commands);
                 commands.barrier(Access::ComputeWrite, Access::ComputeWrite);
             }
@@ -394,7 +439,7 @@ impl Bounce {
 pub struct BounceWork<'w> {
     pub entities: &'w Buffer,
     pub light: BouncedLight<'w>,
-    pub steps: u32,
+    pub steps: Steps,
     /// What the merge reads, by [`Bounce::reads`], and the maps of self-visibility where there are any.
     pub met: Option<(MergeInputs<'w>, Option<&'w Buffer>)>,
 }

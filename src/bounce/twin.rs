@@ -1,7 +1,8 @@
 //! The CPU twin of the passes in f64, from the same links, lists and fields.
 
 use super::movers::{Movers, OUTGOING, OVER, SMOOTH};
-use super::{Bounce, MET, RunBlock};
+use super::relaxation::MOST_STEPS;
+use super::{Bounce, RunBlock, Steps};
 use crate::bake::links::{RUN_BITS, RUNS, WHOLE_SHARE};
 use crate::error::Result;
 use crate::field::self_visibility;
@@ -14,8 +15,6 @@ use crate::sh::lobe::clamped_cosine;
 use glam::{DVec3, Vec3, Vec4, Vec4Swizzles};
 use rayon::prelude::*;
 use std::f64::consts::PI;
-use std::iter::Sum;
-use std::ops::Mul;
 
 /// What the passes read of the scene and of light.
 pub struct TwinInput<'t> {
@@ -41,21 +40,24 @@ pub struct TwinVertex<'t> {
 }
 
 impl Bounce {
-    /// Light of every place after so many steps.
-    pub fn twin(&self, input: &TwinInput<'_>, steps: u32) -> Result<Vec<DVec3>> {
+    /// Light of every place after these steps.
+    pub fn twin(&self, input: &TwinInput<'_>, steps: &Steps) -> Result<Vec<DVec3>> {
         let host = self.download()?;
         let mut light = input.direct.to_vec();
         let mut incoming = vec![(DVec3::ZERO, 0.0); light.len()];
-        for step in 0..steps {
+        for step in 0..steps.count() {
             let passed: Vec<DVec3> = light.iter().zip(input.passes).map(|(light, share)| *light * *share).collect();
             let of_runs = host.means(&passed);
-            if let Some(movers) = self.movers.as_ref().filter(|_| step == steps.saturating_sub(MET)) {
-                movers.twin(input, &of_runs, steps > 1, &mut incoming)?;
+            if let Some(movers) = self.movers.as_ref().filter(|_| step == steps.alone) {
+                movers.twin(input, &of_runs, steps.count() > 1, &mut incoming)?;
             }
+            let gain = Vec3::from(steps.gains[step as usize]).as_dvec3();
             let bounced = |(place, (first, entity, count)): (usize, (usize, usize, usize))| {
                 let (met, taken) = incoming[place];
                 let albedo = DVec3::from(input.objects[entity].albedo_over_pi);
-                input.direct[place] + PI * albedo * (host.along(first, count, &of_runs) * (1.0 - taken) + met)
+                let bounced = PI * albedo * (host.along(first, count, &of_runs) * (1.0 - taken) + met);
+                let found = input.direct[place] + bounced;
+                found + gain * (found - light[place])
             };
             light = host.vertices().enumerate().map(bounced).collect();
         }
@@ -86,8 +88,8 @@ pub(super) struct HostLinks {
 
 impl HostLinks {
     /// Mean light of every run.
-    pub fn means<L: Copy + Default + Sum + Mul<f64, Output = L>>(&self, light: &[L]) -> Vec<L> {
-        let mut means = vec![L::default(); self.run_count];
+    pub fn means(&self, light: &[DVec3]) -> Vec<DVec3> {
+        let mut means = vec![DVec3::ZERO; self.run_count];
         for block in &self.blocks {
             let places: Vec<usize> = (block.vertex_first as usize..).take(block.vertex_count as usize).collect();
             for (first, size) in block.runs.into_iter().zip(RUNS) {
@@ -100,13 +102,27 @@ impl HostLinks {
         means
     }
 
+    /// Light of all bounces up to the last that there may be steps for, from the first, which is what is given.
+    pub fn bounces(&self, light: Vec<DVec3>, albedos: &[Vec3]) -> Vec<Vec<DVec3>> {
+        let mut bounces = vec![light];
+        for _ in 0..MOST_STEPS {
+            let of_runs = self.means(&bounces[bounces.len() - 1]);
+            let vertices: Vec<_> = self.vertices().collect();
+            let bounced = |&(first, entity, count): &(usize, usize, usize)| {
+                albedos[entity].as_dvec3() * self.along(first, count, &of_runs)
+            };
+            bounces.push(vertices.par_iter().map(bounced).collect());
+        }
+        bounces
+    }
+
     /// First link, entity and number of links of every vertex.
     pub fn vertices(&self) -> impl Iterator<Item = (usize, usize, usize)> {
         self.ranges.iter().map(|[first, packed]| (*first as usize, (packed >> 8) as usize, (packed & 255) as usize))
     }
 
     /// Light along links, as a share of the hemisphere times radiosity.
-    pub fn along<L: Copy + Sum + Mul<f64, Output = L>>(&self, first: usize, count: usize, of_runs: &[L]) -> L {
+    pub fn along(&self, first: usize, count: usize, of_runs: &[DVec3]) -> DVec3 {
         let run = |link: &u32| of_runs[(link & ((1 << RUN_BITS) - 1)) as usize];
         let links = self.links[first..][..count].iter();
         links.map(|link| run(link) * (f64::from(link >> RUN_BITS) / f64::from(WHOLE_SHARE))).sum()

@@ -41,6 +41,7 @@ use crate::scene::{LightMethod, Lights, Placement, Scene, light};
 use crate::scene_buffers::{SceneBuffers, limits};
 use crate::shaders::Library;
 use crate::sharp::{self, Sharp, SharpPermutation};
+use glam::Vec3;
 use permutation::{permutation, pixel_shading, usable};
 use picture::FramePicture;
 use pixel::PixelChains;
@@ -64,8 +65,8 @@ fn methods(scene: &Scene, lights: Lights) -> Vec<LightMethod> {
 }
 
 /// Largest albedo of each entity, of any colour.
-fn albedos(scene: &Scene) -> Vec<f32> {
-    scene.entities.iter().map(|entity| entity.albedo.max_element()).collect()
+fn albedos(scene: &Scene) -> Vec<Vec3> {
+    scene.entities.iter().map(|entity| entity.albedo).collect()
 }
 
 /// A scene on a device, ready to be lit and drawn at any time.

@@ -268,7 +268,7 @@ impl Frame {
         };
         let input =
             TwinInput { direct: &direct, passes: &passes, objects: &objects, skip: self.options.skip, vertex: &vertex };
-        let wanted = bounce.twin(&input, bounce.steps(self.options.bounces))?;
+        let wanted = bounce.twin(&input, &bounce.steps(self.options.bounces))?;
         Ok(Some([light(&self.radiosity.merged)?, wanted]))
     }
 }

@@ -31,8 +31,8 @@ pub struct RayCast {
     pub runs: u32,
     pub seed: u64,
     pub distant: Distant,
-    /// How often light bounces; each ray that counts it is followed from surface to surface, which reflect diffusely
-    /// with their base colour.
+    /// How often light bounces at most; each ray that counts it is followed from surface to surface, which reflect
+    /// diffusely with their base colour. Of paths that are longer than three bounces a part stands for all.
     pub bounces: u32,
     /// Whether glossy surfaces lose light that microfacets pass on to each other.
     pub single_scatter: bool,
@@ -289,6 +289,14 @@ impl RayCast {
             let step = RayCast { seed: walk.points.seed(), ..one };
             sum += weight * DVec3::from(step.point(world, radiance, (&view, &surface), key).radiosity);
             weight *= base;
+            if bounce >= SURE_BOUNCES {
+                // Russian roulette.
+                let stays = weight.max_element().min(1.0);
+                if walk.points.other(self.bounces + bounce).point(walk.path).x >= stays {
+                    break;
+                }
+                weight /= stays;
+            }
             direction = Axes::new(view.normal).cosine(walk.points.other(bounce).point(walk.path));
         }
         sum
@@ -302,6 +310,9 @@ struct Point<'p> {
     surface: &'p Reflection,
     points: Sequence,
 }
+
+/// After so many bounces a path may end by chance.
+const SURE_BOUNCES: u32 = 2;
 
 /// A path from surface to surface.
 struct Walk<'p> {

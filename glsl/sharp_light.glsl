@@ -387,6 +387,13 @@ uint next_entry(Surface surface, uint first, uint count, uint i, bool within) {
 // `open` past none. `open` is a constant, so the compiler keeps one side. `i` becomes the entry behind the light.
 vec3 chain_sum(Surface surface, Entity shining, bool open, uint first, uint count, inout uint i) {
     SeenLight light = seen_light(shining.centre.xyz - surface.origin - surface.position, shining);
+#if OUTLINES && BOXES
+    if (shining.light_kind == LIGHT_OUTLINE) {
+        uint own = shining.silhouette & ~HAS_HALVES;
+        light.box[0] = node_quad(own).xyz / shining.centre.w;
+        light.box[1] = node_quad(own + 1).xyz / shining.centre.w;
+    }
+#endif
     uint b = light.fine >= 1.0 ? 1 : 0, last = light.fine <= 0.0 ? 0 : 4;
     uint j = i;
     float irradiance = 0.0;

@@ -7,6 +7,10 @@ struct SeenLight {
     float distance; // of its centre, metres
     float sine;     // of the angular radius of its bounding sphere
     float fine;     // share of the four fine blocks
+#if OUTLINES && BOXES
+    mat3 to_box;    // from the axes above to the light's own
+    vec3 box[2];    // least and largest corner of the light, from its centre, metres; equal where they tell nothing
+#endif
 #if PANELS
     uint kind;
     float ratio;    // of a rectangle's edges, second over first
@@ -53,6 +57,11 @@ SeenLight seen_light(vec3 to, Entity shining) {
 #if OUTLINES
     // Four parts do not carry the outline of a mesh.
     light.fine = shining.light_kind == LIGHT_OUTLINE ? 1.0 : light.fine;
+#if BOXES
+    light.to_box = mat3(to_object(shining, light.toward), to_object(shining, light.across), to_object(shining, light.down));
+    light.box[0] = vec3(0.0);
+    light.box[1] = vec3(0.0);
+#endif
 #endif
 #if PANELS
     light.kind = shining.light_kind;
@@ -139,7 +148,18 @@ float reach_of(SeenLight light, vec2 place, vec3 along) {
         return length(vec3(light.distance, 0.0, 0.0) + light.half_edges * place);
     }
 #endif
-    return light.distance * (along.x - light.sine * sqrt(1.0 - dot(place, place)));
+    float reach = light.distance * (along.x - light.sine * sqrt(1.0 - dot(place, place)));
+#if OUTLINES && BOXES
+    // A flat body lies behind most of its bounding sphere.
+    vec3 direction = light.to_box * along;
+    vec3 per_step = 1.0 / mix(direction, vec3(LEAST_STEP), lessThan(abs(direction), vec3(LEAST_STEP)));
+    vec3 point = -light.distance * light.to_box[0];
+    vec3 one = (light.box[0] - point) * per_step, other = (light.box[1] - point) * per_step;
+    vec3 first = min(one, other), last = max(one, other);
+    float enters = max(max(first.x, first.y), first.z), leaves = min(min(last.x, last.y), last.z);
+    reach = enters < leaves ? max(reach, enters) : reach;
+#endif
+    return reach;
 }
 
 // Irradiance that a part sends to a surface that faces it, of radiance 1.

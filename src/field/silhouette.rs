@@ -324,11 +324,7 @@ impl SilhouetteField {
     /// Where a ray enters and leaves the box around the object. If it misses the box, the interval has no ends, and the
     /// outline alone decides.
     fn through_box(&self, point: DVec3, direction: DVec3) -> [f64; 2] {
-        let least = DVec3::splat(LEAST_STEP);
-        let step = DVec3::select(direction.abs().cmplt(least), least, direction);
-        let [one, other] = self.extent().map(|corner| (corner - point) / step);
-        let ends = [one.min(other).max_element(), one.max(other).min_element()];
-        if ends[0] > ends[1] { [-NO_BOX, NO_BOX] } else { ends }
+        through_box(self.extent(), point, direction).unwrap_or([-NO_BOX, NO_BOX])
     }
 
     /// Share of a small round light that the object blocks, as seen from the point of `near`: the light's middle lies
@@ -356,6 +352,15 @@ impl SilhouetteField {
         let halves = beyond * before * whole + beyond * (1.0 - before) * far + before * (1.0 - beyond) * near;
         whole * counts + inside * (halves - whole * counts)
     }
+}
+
+/// Where a ray enters and leaves a box, if it meets it.
+pub fn through_box(corners: [DVec3; 2], point: DVec3, direction: DVec3) -> Option<[f64; 2]> {
+    let least = DVec3::splat(LEAST_STEP);
+    let step = DVec3::select(direction.abs().cmplt(least), least, direction);
+    let [one, other] = corners.map(|corner| (corner - point) / step);
+    let ends = [one.min(other).max_element(), one.max(other).min_element()];
+    (ends[0] <= ends[1]).then_some(ends)
 }
 
 /// How far an outline counts that lies that far away (in r): one behind the receiver or beyond the limit blocks

@@ -8,6 +8,7 @@
 //! square. Where the horizon cuts a light, so it cuts each part. Parts of a panel lie on its own face ([`Pattern`]),
 //! and each is a round light of its part's solid angle.
 
+use super::silhouette;
 use glam::{DQuat, DVec2, DVec3};
 use std::f64::consts::PI;
 
@@ -135,6 +136,8 @@ pub struct SeenLight {
     pub fine: f64,
     /// The face that shines, of a light that is no ball.
     panel: Option<SeenPanel>,
+    /// Corners of the box around it, from its centre, metres, and how that is turned.
+    boxed: Option<([DVec3; 2], DQuat)>,
 }
 
 /// A face that shines.
@@ -169,13 +172,33 @@ impl SeenLight {
     pub fn new(to: DVec3, radius: f64) -> Self {
         let distance = to.length();
         let sine = (radius / distance.max(f64::MIN_POSITIVE)).min(MOST_SINE);
-        SeenLight { toward: to.normalize_or(DVec3::Y), distance, sine, fine: fine_share(sine), panel: None }
+        SeenLight {
+            toward: to.normalize_or(DVec3::Y),
+            distance,
+            sine,
+            fine: fine_share(sine),
+            panel: None,
+            boxed: None,
+        }
     }
 
     /// The light with an outline of its own, which is always four blocks: four parts err by 0.07 of the light of a
     /// torus and by 0.10 of a teapot's, sixteen by 0.02 and 0.04, without factors ([`super::lamp_colors`]).
     pub fn outlined(to: DVec3, radius: f64) -> Self {
         SeenLight { fine: 1.0, ..Self::new(to, radius) }
+    }
+
+    /// The same with a box around it, turned by `rotation`: a flat body lies behind most of its bounding sphere.
+    pub fn boxed(self, corners: [DVec3; 2], rotation: DQuat) -> Self {
+        SeenLight { boxed: Some((corners, rotation)), ..self }
+    }
+
+    /// Where the box begins in a direction, as far as that meets it.
+    fn enters_box(&self, toward: DVec3) -> Option<f64> {
+        let (corners, rotation) = self.boxed?;
+        let point = rotation.inverse() * (-self.distance * self.toward);
+        let [enters, leaves] = silhouette::through_box(corners, point, rotation.inverse() * toward)?;
+        (enters < leaves).then_some(enters)
     }
 
     /// The face of a panel with that bounding sphere, turned by `rotation`.
@@ -266,9 +289,11 @@ impl SeenLight {
     /// light above the horizon send exactly pi sin^2 n.w.
     fn part_of_ball(&self, block: &Block, place: DVec2) -> LightPart {
         let tilt = self.tilt(place);
+        let toward = self.direction(place);
+        let front = self.distance * (tilt - self.sine * (1.0 - place.length_squared()).sqrt());
         LightPart {
-            toward: self.direction(place),
-            distance: self.distance * (tilt - self.sine * (1.0 - place.length_squared()).sqrt()),
+            toward,
+            distance: self.enters_box(toward).map_or(front, |enters| enters.max(front)),
             sine: self.sine * block.area.sqrt(),
             weight: PI * self.sine * self.sine * block.area * block.weight / tilt,
         }

@@ -85,7 +85,12 @@ impl SharpTwin<'_> {
         let (seen, share) = match light.method {
             LightMethod::Ball(share) => (SeenLight::new(to, radius), Some(share)),
             LightMethod::LampFace(panel) => (SeenLight::panel(to, radius, panel, shining.rotation), Some(1.0)),
-            LightMethod::Outline => (SeenLight::outlined(to, radius), None),
+            LightMethod::Outline => {
+                let field = shining.silhouette.expect("what shines by its outline has a silhouette field");
+                let seen = SeenLight::outlined(to, radius);
+                let corners = field.extent().map(|corner| radius * corner);
+                (if field.has_box() { seen.boxed(corners, shining.rotation) } else { seen }, None)
+            }
             LightMethod::Harmonics => return DVec3::ZERO,
         };
         let between = |j: &&usize| **j != light.entity && !(self.leaves)(v, **j, light.entity);

@@ -8,7 +8,6 @@ use shadow_fields::bake::capture::Capture;
 use shadow_fields::bake::project::Project;
 use shadow_fields::bake::raster::Raster;
 use shadow_fields::bake::silhouette::{Silhouette, SilhouetteOptions};
-use shadow_fields::bench::shadow_map::{Filter, ShadowMaps};
 use shadow_fields::bounce::movers::{distant_row, movers_row, outgoing_row};
 use shadow_fields::bounce::{bounce_row, runs_row};
 use shadow_fields::draw::grid::DrawGrid;
@@ -131,8 +130,7 @@ fn measuring() -> Vec<ShaderPermutation> {
         let row = ShaderPermutation::new("ceiling.comp", 4).define("KIND", kind);
         row.define("READS", 16_u32).define("ROUNDS", 16_u32).define("MASK", 1023_u32)
     };
-    let maps = [Filter::Hard, Filter::Pcss].into_iter().flat_map(|filter| ShadowMaps::permutations(filter, 512));
-    (0..4).map(rate).chain(maps).collect()
+    (0..4).map(rate).collect()
 }
 
 fn lattice(text: &str) -> Lattice {

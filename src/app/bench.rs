@@ -25,7 +25,7 @@ pub struct Arguments {
 
 #[derive(Subcommand)]
 enum What {
-    /// Split the error of pictures into its causes, and compare with ray casting and shadow maps
+    /// Split the error of pictures into its causes, and compare with ray casting
     #[command(
         after_help = "Examples:\n  shadow-fields bench time-error --quick --output out/errors\n  shadow-fields bench time-error my_scene.toml \
         --output out/my_scene\n  shadow-fields bench time-error --case torus --output out/torus"
@@ -212,8 +212,8 @@ fn tell_time_error(outcome: &TimeErrorOutcome, to: &Tables<'_>) -> Result<()> {
         ("bytes of fields", "/field_bytes"),
     ];
     to.add("qualities", title, &outcome.qualities, &columns)?;
-    let title = "\nA frame, everything merged, against ray casting with as many threads at equal error, and the quickest shadow map that errs no \
-         more\n(at vertices without drawing, at pixels with it)";
+    let title = "\nA frame, everything merged, against ray casting with as many threads at equal error\n(at vertices without drawing, at \
+         pixels with it)";
     let columns = [
         ("scene", "/title"),
         ("frame ms", "/frame_wall_ms/median"),
@@ -222,7 +222,6 @@ fn tell_time_error(outcome: &TimeErrorOutcome, to: &Tables<'_>) -> Result<()> {
         ("rays ms", "/rival_ms_at_equal_rms"),
         ("times faster", "/speed_up_at_equal_rms_ratio"),
         ("merge alone", "/merge_speed_up_at_equal_rms_ratio"),
-        ("map ms", "/map_ms_at_equal_rms"),
     ];
     to.add("comparisons", title, &outcome.comparisons, &columns)
 }

@@ -12,7 +12,6 @@ pub mod judged;
 pub mod profile;
 pub mod rival;
 pub mod scaling;
-pub mod shadow_map;
 pub mod skips;
 pub mod stability;
 pub mod time_error;

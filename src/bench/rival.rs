@@ -1,18 +1,17 @@
-//! Comparison with the alternatives to shadow fields, at vertices and at pixels: soft shadows by ray casting on all CPU
-//! threads, and, where all lights are balls, by shadow maps on the same device ([`super::shadow_map`]).
+//! Comparison with the alternative to shadow fields, at vertices and at pixels: soft shadows by ray casting on all CPU
+//! threads.
 //!
 //! The rival is [`RayCast`] in one run. It uses an 8-wide hierarchy per mesh behind a bounding sphere test, scrambled
 //! Sobol points, cosine sampling of the sky and cone sampling of local lights, and leaves out occluders that cannot lie
 //! between point and light. Rays stop at the light's surface; where along a ray that is, is asked only where an
 //! occluder lies beside the light. Its hierarchies are built beforehand, as fields are baked beforehand. At pixels a
-//! frame of ours draws its picture, and the rivals are given what each pixel shows and light that; the time of a plain
-//! drawing is added to theirs.
+//! frame of ours draws its picture, and the rival is given what each pixel shows and lights that; the time of a plain
+//! drawing is added to its own.
 
 use super::budget::{Reference, device_radiosity};
 use super::cases::Case;
 use super::figures::{Radiosity, Spread, VertexDifference, along, crossing, spread};
 use super::judged::{Judged, JudgedAt, PIXEL_SIZE};
-use super::shadow_map::{Filter, ShadowMaps, maps_apply};
 use super::{Bench, default_options, merge_ms};
 use crate::draw::Shading;
 use crate::error::Result;
@@ -35,20 +34,7 @@ pub struct RivalPoint {
     pub error: VertexDifference,
 }
 
-/// Shadow maps of one size. They light from the lamps alone: the sky's part of the truth is given to them.
-#[derive(Clone, Debug, Serialize)]
-pub struct MapPoint {
-    /// One comparison, or percentage-closer soft shadows.
-    pub filter: Filter,
-    /// Texels across a view.
-    pub map_px: u32,
-    /// Wall time of drawing the maps and lighting all points, milliseconds.
-    pub wall_ms: Spread,
-    /// Difference to T0.
-    pub error: VertexDifference,
-}
-
-/// Merge, ray casting and shadow maps on one case.
+/// Merge and ray casting on one case.
 #[derive(Clone, Debug, Serialize)]
 pub struct Comparison {
     pub case: String,
@@ -72,10 +58,6 @@ pub struct Comparison {
     /// Wall time in which ray casting reaches the merge's root mean square error, milliseconds: interpolated,
     /// extrapolated, or the time of one ray if that already has a smaller error.
     pub rival_ms_at_equal_rms: Option<f64>,
-    /// Shadow maps, hard ones first, with increasing sizes; none where a light is no ball.
-    pub maps: Vec<MapPoint>,
-    /// The shortest wall time in which a shadow map has at most the merge's root mean square error, milliseconds.
-    pub map_ms_at_equal_rms: Option<f64>,
     /// Number of rays at which it reaches that error.
     #[serde(rename = "rays_at_equal_rms_count")]
     pub rays_at_equal_rms: Option<f64>,
@@ -153,9 +135,8 @@ impl Merged {
         Ok(judged.keys().map(pixel).collect())
     }
 
-    fn comparison(&self, case: &Case, judged: &Judged, rival: &[RivalPoint], maps: &[MapPoint]) -> Result<Comparison> {
+    fn comparison(&self, case: &Case, judged: &Judged, rival: &[RivalPoint]) -> Result<Comparison> {
         let merge_error = judged.error(&self.found(judged)?);
-        let as_good = maps.iter().filter(|p| p.error.rms <= merge_error.rms).map(|p| p.wall_ms.median);
         let errors: Vec<(f64, f64)> = rival.iter().map(|p| (f64::from(p.rays), p.error.rms)).collect();
         let times: Vec<(f64, f64)> = rival.iter().map(|p| (f64::from(p.rays), p.wall_ms.median)).collect();
         let rays_at_equal_rms = crossing(&errors, merge_error.rms);
@@ -173,12 +154,10 @@ impl Merged {
             case: case.name.clone(),
             title: format!("{}, {way} at {}", case.name, judged.place.name()),
             place: judged.place,
-            points: judged.points.len(),
+            points: judged.all,
             lights: self.lights,
             shading: self.shading,
             merge_error,
-            map_ms_at_equal_rms: as_good.min_by(f64::total_cmp),
-            maps: maps.to_vec(),
             rival_ms_at_equal_rms: rival_ms,
             rays_at_equal_rms,
             speed_up_at_equal_rms: rival_ms.map(|ms| ms / frame_wall_ms.median),
@@ -190,7 +169,7 @@ impl Merged {
     }
 }
 
-/// Measures merge, shadow maps and ray casting in turns, at vertices and at pixels: where a light can be sharp, with
+/// Measures merge and ray casting in turns, at vertices and at pixels: where a light can be sharp, with
 /// sharp lights and with lights in SH, at pixels also with sharp lights by vertex.
 pub fn compare(bench: &Bench<'_>, case: &Case, reference: &Reference) -> Result<Vec<Comparison>> {
     let shapes = RayMeshes::new(&case.scene);
@@ -208,8 +187,7 @@ fn compare_at(bench: &Bench<'_>, case: &Case, shapes: &RayMeshes, judged: &Judge
     let placements = case.scene.at(case.time_s);
     let mut merged = Merged::all(bench, case, judged.place)?;
     let rays: &[u32] = if bench.quick { &[1, 4, 16, 64, 256] } else { &[1, 4, 16, 64, 256, 1024, 4096] };
-    let share = judged.points.len() as f64 / judged.chosen.len() as f64;
-    let mut maps = Maps::new(bench, case, shapes, judged);
+    let share = judged.all as f64 / judged.points.len() as f64;
     let mut rival_walls = vec![Vec::new(); rays.len()];
     let mut found: Vec<Vec<Radiosity>> = vec![Vec::new(); rays.len()];
     let mut redrawn = Vec::new();
@@ -218,7 +196,6 @@ fn compare_at(bench: &Bench<'_>, case: &Case, shapes: &RayMeshes, judged: &Judge
         if let (Some(last), JudgedAt::Pixels) = (merged.last_mut(), judged.place) {
             redrawn.push(last.redraw_ms(&placements)?);
         }
-        maps.round(&placements)?;
         for (index, &rays) in rays.iter().enumerate() {
             // Long runs need fewer repetitions.
             if round >= 3 && rays > 256 {
@@ -237,61 +214,6 @@ fn compare_at(bench: &Bench<'_>, case: &Case, shapes: &RayMeshes, judged: &Judge
     let rival: Vec<RivalPoint> = rival
         .map(|((&rays, walls), found)| RivalPoint { rays, wall_ms: with_drawing(&walls), error: judged.error(found) })
         .collect();
-    let maps = maps.points(with_drawing);
-    (bench.progress)(&format!("{}: merge against its rivals measured at {}", case.name, judged.place.name()));
-    merged.iter().map(|merged| merged.comparison(case, judged, &rival, &maps)).collect()
-}
-
-/// Texels across a view that are measured; a quick run takes every other.
-const MAP_PX: [u32; 4] = [256, 512, 1024, 2048];
-
-/// Shadow maps of all sizes, measured round by round.
-struct Maps<'c> {
-    bench: &'c Bench<'c>,
-    case: &'c Case,
-    judged: &'c Judged,
-    /// Radiosity of the compared points under the sky alone.
-    sky: Vec<Radiosity>,
-    /// Filter, size, wall times, and what was found last.
-    measured: Vec<(Filter, u32, Vec<f64>, Vec<Radiosity>)>,
-}
-
-impl<'c> Maps<'c> {
-    fn new(bench: &'c Bench<'c>, case: &'c Case, shapes: &RayMeshes, judged: &'c Judged) -> Self {
-        let sizes = || MAP_PX.into_iter().skip(usize::from(bench.quick)).step_by(1 + usize::from(bench.quick));
-        let all = [Filter::Hard, Filter::Pcss].into_iter().flat_map(|filter| sizes().map(move |px| (filter, px)));
-        let all = all.filter(|_| maps_apply(&case.scene));
-        let measured: Vec<_> = all.map(|(filter, px)| (filter, px, Vec::new(), Vec::new())).collect();
-        let sky = if measured.is_empty() { Vec::new() } else { judged.sky(bench, case, shapes) };
-        Maps { bench, case, judged, sky, measured }
-    }
-
-    /// Draws and lights three times with each; the first time warms up.
-    fn round(&mut self, placements: &[Placement]) -> Result<()> {
-        let gpu = (self.bench.baker.device(), self.bench.baker.library());
-        for (filter, px, walls, found) in &mut self.measured {
-            let maps = ShadowMaps::new(gpu, &self.case.scene, placements, &self.judged.points, (*filter, *px))?;
-            for warm in [false, true, true] {
-                let started = Instant::now();
-                maps.run(&self.case.scene, placements)?;
-                if warm {
-                    walls.push(started.elapsed().as_secs_f64() * 1e3);
-                }
-            }
-            let lamps = maps.radiosity()?;
-            let of = |(&i, sky): (&usize, &Radiosity)| std::array::from_fn(|c| sky[c] + lamps[i][c]);
-            *found = self.judged.chosen.iter().zip(&self.sky).map(of).collect();
-        }
-        Ok(())
-    }
-
-    fn points(self, with_drawing: impl Fn(&[f64]) -> Spread) -> Vec<MapPoint> {
-        let point = |(filter, map_px, walls, found): &(Filter, u32, Vec<f64>, Vec<Radiosity>)| MapPoint {
-            filter: *filter,
-            map_px: *map_px,
-            wall_ms: with_drawing(walls),
-            error: self.judged.error(found),
-        };
-        self.measured.iter().map(point).collect()
-    }
+    (bench.progress)(&format!("{}: merge against rays measured at {}", case.name, judged.place.name()));
+    merged.iter().map(|merged| merged.comparison(case, judged, &rival)).collect()
 }

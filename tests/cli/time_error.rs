@@ -103,7 +103,7 @@ fn a_scene_of_ones_own() {
     }
     let total = rms(&outcome["budgets"][0]["total"]);
     assert!(total > 0.01 && total < 0.3, "four bands below a small light: {total}");
-    // Sharp lights beside lights in SH, against the same rivals.
+    // Sharp lights beside lights in SH, against the same rays.
     let comparisons = outcome["comparisons"].as_array().unwrap();
     let ways: Vec<[&str; 3]> = comparisons
         .iter()
@@ -115,22 +115,15 @@ fn a_scene_of_ones_own() {
     assert_eq!(ways, [&by_vertex[..], &by_pixel].concat());
     assert_eq!(comparisons[0]["rival"], comparisons[1]["rival"]);
     let [sharp, sh] = [0, 1].map(|i| rms(&comparisons[i]["merge_error"]));
-    // At pixels the coarse floor's vertices carry no edge; the same rivals stand beside all three, and more rays err
+    // At pixels the coarse floor's vertices carry no edge; the same rays stand beside all three, and more of them err
     // less.
     let [pixel, vertex, pixel_sh] = [2, 3, 4].map(|i| rms(&comparisons[i]["merge_error"]));
     assert!(pixel < 0.6 * vertex && vertex < pixel_sh, "{pixel}, {vertex}, {pixel_sh}");
     assert_eq!(comparisons[2]["rival"], comparisons[4]["rival"]);
     let cast: Vec<f64> = comparisons[2]["rival"].as_array().unwrap().iter().map(|p| rms(&p["error"])).collect();
     assert!(cast.windows(2).all(|pair| pair[1] < pair[0]) && cast[4] < 0.05, "{cast:?}");
-    assert_eq!(comparisons[2]["maps"].as_array().unwrap().len(), 4);
     assert!(sharp < 0.5 * sh && (sh / total - 1.0).abs() < 1e-6, "{sharp} and {sh} of {total}");
     assert!((rms(&outcome["budgets"][0]["sharp_total"]) / sharp - 1.0).abs() < 1e-6);
-    // Shadow maps: a hard edge errs more than a soft one, and each has its time.
-    let maps = outcome["comparisons"][0]["maps"].as_array().unwrap();
-    let kinds: Vec<String> =
-        maps.iter().map(|p| format!("{} {}", p["filter"].as_str().unwrap(), p["map_px"])).collect();
-    assert_eq!(kinds, ["hard 512", "hard 2048", "pcss 512", "pcss 2048"]);
-    assert!(rms(&maps[3]["error"]) < 0.9 * rms(&maps[1]["error"]), "{maps:?}");
 }
 
 #[test]

@@ -19,7 +19,6 @@ mod order;
 mod project;
 mod renderer;
 mod self_visibility;
-mod shadow_map;
 mod sharp;
 mod sharp_motion;
 mod sheet;

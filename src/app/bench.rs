@@ -193,8 +193,7 @@ fn tell_time_error(outcome: &TimeErrorOutcome, to: &Tables<'_>) -> Result<()> {
     let title = "Relative RMS error over vertices against rays from them, by cause (p99 and max of the total)";
     let columns = [
         ("scene", "/case"),
-        ("bands", "/bands/rms_relative"),
-        ("sampling", "/sampling/rms_relative"),
+        ("bands and sampling", "/bands_and_sampling/rms_relative"),
         ("storage", "/arithmetic_and_storage/rms_relative"),
         ("total in SH", "/total/rms_relative"),
         ("sharp lights", "/sharp_total/rms_relative"),

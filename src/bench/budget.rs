@@ -9,7 +9,7 @@ use crate::frame::{self, Frame};
 use crate::scene::Lights;
 use crate::scene::light::has_sharp;
 use crate::truth::raycast::{RayCast, relative_error};
-use crate::truth::{ExactChain, RayMeshes, Vertex, World, sample_vertices};
+use crate::truth::{RayMeshes, Vertex, World, sample_vertices};
 use serde::Serialize;
 
 /// Number of vertices that are compared per scene.
@@ -22,18 +22,12 @@ pub struct Effort {
     pub vertices: usize,
     /// Rays of T0 per vertex and light.
     pub t0_rays: u32,
-    /// Rays of T1 per factor.
-    pub t1_rays: u32,
 }
 
 impl Effort {
     /// Effort of a quick or a thorough run.
     pub fn new(quick: bool) -> Self {
-        if quick {
-            Effort { vertices: 1000, t0_rays: 1024, t1_rays: 1024 }
-        } else {
-            Effort { vertices: VERTICES, t0_rays: 16384, t1_rays: 8192 }
-        }
+        if quick { Effort { vertices: 1000, t0_rays: 1024 } } else { Effort { vertices: VERTICES, t0_rays: 16384 } }
     }
 }
 
@@ -48,6 +42,21 @@ pub struct Reference {
 }
 
 impl Reference {
+    /// The truth of a case, which does not depend on options of bake or merge; an error where no light reaches any of
+    /// the vertices.
+    pub fn of_case(case: &Case, effort: Effort, seed: u64) -> Result<Self> {
+        let shapes = RayMeshes::new(&case.scene);
+        let world = World::new(&case.scene, &shapes, &case.scene.at(case.time_s));
+        let cast = RayCast { rays: effort.t0_rays, seed, distant: case.distant, ..Default::default() };
+        let reference = Reference::new(&world, effort.vertices, &cast);
+        if reference.t0.as_flattened().iter().any(|c| *c > 0.0) {
+            return Ok(reference);
+        }
+        let count = reference.vertices.len();
+        let what = format!("no light reaches any of the {count} judged vertices, so there is nothing to compare");
+        Err(Error::Input(format!("{}: {what}", case.name)))
+    }
+
     /// `count` vertices of the world's scene, or all if there are fewer.
     pub fn new(world: &World<'_>, count: usize, cast: &RayCast) -> Self {
         let vertices = sample_vertices(world.scene, count, cast.seed);
@@ -60,43 +69,6 @@ impl Reference {
     /// Difference to T0 relative to its root mean square.
     pub fn error(&self, of: &[Radiosity]) -> VertexDifference {
         difference(of, &self.t0, self.unit)
-    }
-}
-
-/// T0 and T1 of a case, which do not depend on options of bake or merge.
-pub struct Truth {
-    pub reference: Reference,
-    /// Radiosity of T1: exact factors, band-limited chain.
-    pub t1: Vec<Radiosity>,
-    /// Relative standard error of `t1`, from two halves of its rays.
-    pub t1_error: f64,
-}
-
-impl Truth {
-    pub fn new(case: &Case, effort: Effort, seed: u64) -> Self {
-        let shapes = RayMeshes::new(&case.scene);
-        let world = World::new(&case.scene, &shapes, &case.scene.at(case.time_s));
-        let cast = RayCast { rays: effort.t0_rays, seed, distant: case.distant, ..Default::default() };
-        let reference = Reference::new(&world, effort.vertices, &cast);
-        let [first, second] = [1 << 32, 2 << 32].map(|half| {
-            let chain = ExactChain { rays: effort.t1_rays / 2, seed: seed ^ half, ..Default::default() };
-            chain.run(&world, &reference.vertices)
-        });
-        Truth {
-            t1_error: difference(&first, &second, reference.unit).rms / 2.0,
-            t1: first.iter().zip(&second).map(|(a, b)| std::array::from_fn(|c| (a[c] + b[c]) / 2.0)).collect(),
-            reference,
-        }
-    }
-
-    /// Whether there is anything to compare.
-    pub fn check(&self, case: &Case) -> Result<()> {
-        if self.reference.t0.as_flattened().iter().any(|c| *c > 0.0) {
-            return Ok(());
-        }
-        let count = self.reference.vertices.len();
-        let what = format!("no light reaches any of the {count} judged vertices, so there is nothing to compare");
-        Err(Error::Input(format!("{}: {what}", case.name)))
     }
 }
 
@@ -127,33 +99,27 @@ pub struct Budget {
     /// T0's own relative standard error.
     #[serde(rename = "t0_error_relative")]
     pub t0_error: f64,
-    /// T1's own relative standard error.
-    #[serde(rename = "t1_error_relative")]
-    pub t1_error: f64,
-    /// T0 to T1, the merge's order of occluders and lights by their centres included.
-    pub bands: VertexDifference,
+    /// T0 to T1: what few bands lose, the lattice, and the merge's order of occluders and lights by their centres.
+    pub bands_and_sampling: VertexDifference,
     /// T1 to T2.
-    pub sampling: VertexDifference,
-    /// T2 to T3.
     pub arithmetic_and_storage: VertexDifference,
-    /// T0 to T3.
+    /// T0 to T2.
     pub total: VertexDifference,
     /// T0 to the merge on the device with sharp lights, which the rungs are not about; none where no light can be
     /// sharp.
     pub sharp_total: Option<VertexDifference>,
 }
 
-/// Computes T2 and T3 with fields and a merge of the given options, all lights in SH, and compares all rungs; then the
+/// Computes T1 and T2 with fields and a merge of the given options, all lights in SH, and compares all rungs; then the
 /// same merge with sharp lights.
-pub fn budget(bench: &Bench<'_>, case: &Case, truth: &Truth, options: frame::Options) -> Result<Budget> {
+pub fn budget(bench: &Bench<'_>, case: &Case, reference: &Reference, options: frame::Options) -> Result<Budget> {
     let placements = case.scene.at(case.time_s);
-    let reference = &truth.reference;
     let options = frame::Options { lights: Lights::Sh, ..options };
     let wide = frame::Options { bake: crate::bake::Options { storage: Storage::F32, ..options.bake }, ..options };
-    let t2 = select(&bench.frame(&case.scene, wide)?.twin(&placements)?, &reference.vertices);
+    let t1 = select(&bench.frame(&case.scene, wide)?.twin(&placements)?, &reference.vertices);
     let mut frame = bench.frame(&case.scene, options)?;
     frame.render(&placements, None)?;
-    let t3 = device_radiosity(&frame, &reference.vertices)?;
+    let t2 = device_radiosity(&frame, &reference.vertices)?;
     let sharp_total = if has_sharp(&case.scene, Lights::Sharp) {
         let mut frame = bench.frame(&case.scene, frame::Options { lights: Lights::Sharp, ..options })?;
         frame.render(&placements, None)?;
@@ -166,11 +132,9 @@ pub fn budget(bench: &Bench<'_>, case: &Case, truth: &Truth, options: frame::Opt
         case: case.name.clone(),
         vertices: reference.vertices.len(),
         t0_error: reference.t0_error,
-        t1_error: truth.t1_error,
-        bands: between(&reference.t0, &truth.t1),
-        sampling: between(&truth.t1, &t2),
-        arithmetic_and_storage: between(&t2, &t3),
-        total: between(&reference.t0, &t3),
+        bands_and_sampling: between(&reference.t0, &t1),
+        arithmetic_and_storage: between(&t1, &t2),
+        total: between(&reference.t0, &t2),
         sharp_total,
     })
 }

@@ -1,6 +1,6 @@
 //! `bench time-error`: error budgets, run time against error, and ray casting beside it.
 
-use super::budget::{Budget, Effort, Truth, budget, device_radiosity};
+use super::budget::{Budget, Effort, Reference, budget, device_radiosity};
 use super::cases::{self, Case};
 use super::figures::{Spread, VertexDifference, spread};
 use super::rival::{Comparison, compare};
@@ -37,18 +37,17 @@ pub fn run(bench: &Bench<'_>, cases: &[Case]) -> Result<TimeErrorOutcome> {
     let effort = Effort::new(bench.quick);
     for (index, case) in cases.iter().enumerate() {
         (bench.progress)(&format!("case {} of {}, {}: casting rays", index + 1, cases.len(), case.name));
-        let truth = Truth::new(case, effort, bench.seed);
-        truth.check(case)?;
-        outcome.budgets.push(budget(bench, case, &truth, default_options())?);
+        let reference = Reference::of_case(case, effort, bench.seed)?;
+        outcome.budgets.push(budget(bench, case, &reference, default_options())?);
         (bench.progress)(&format!("{}: errors split into their causes", case.name));
-        outcome.qualities.extend(qualities(bench, case, &truth)?);
-        outcome.comparisons.extend(compare(bench, case, &truth.reference)?);
+        outcome.qualities.extend(qualities(bench, case, &reference)?);
+        outcome.comparisons.extend(compare(bench, case, &reference)?);
     }
     Ok(outcome)
 }
 
 /// All qualities on the same vertices, rendered in turns, so that whatever else the machine does meets all alike.
-fn qualities(bench: &Bench<'_>, case: &Case, truth: &Truth) -> Result<Vec<QualityPoint>> {
+fn qualities(bench: &Bench<'_>, case: &Case, reference: &Reference) -> Result<Vec<QualityPoint>> {
     let placements = case.scene.at(case.time_s);
     let base = default_options();
     let frame = |quality: Quality| {
@@ -75,7 +74,7 @@ fn qualities(bench: &Bench<'_>, case: &Case, truth: &Truth) -> Result<Vec<Qualit
             quality: format!("{quality:?}").to_lowercase(),
             field_bytes: frame.buffers.fields.size_bytes,
             merge_ms: spread(times),
-            error: truth.reference.error(&device_radiosity(frame, &truth.reference.vertices)?),
+            error: reference.error(&device_radiosity(frame, &reference.vertices)?),
         })
     };
     all.iter().zip(&frames).zip(&times).map(point).collect()

@@ -189,7 +189,7 @@ pub const BEHIND_SHEET: f64 = 0.2;
 
 /// Share with which a sheet counts above a horizon: 0 where none of it rises above, and all where it may rise by
 /// [`SKIP_FADE_RAD`]. The twin of `glsl/merge_sheet.glsl`, as all about sheets here.
-pub fn sheet_above_horizon(sheet: &SheetView, normal: DVec3, skip: Skip) -> f64 {
+fn sheet_above_horizon(sheet: &SheetView, normal: DVec3, skip: Skip) -> f64 {
     let highest = sheet.corners().into_iter().map(|corner| corner.dot(normal)).fold(f64::NEG_INFINITY, f64::max);
     if skip.horizon { smoothstep(0.0, SKIP_FADE_RAD.sin(), highest / sheet.nearest_m()) } else { 1.0 }
 }
@@ -198,7 +198,7 @@ pub fn sheet_above_horizon(sheet: &SheetView, normal: DVec3, skip: Skip) -> f64 
 /// as that centre goes from the sheet's plane to [`BEHIND_SHEET`] beyond it. It is less where the two stand side by
 /// side: 1 where the light reaches [`CONES_MEET_RAD`] into the sheet or its middle does, fading to 0 where they are
 /// [`SKIP_FADE_RAD`] apart.
-pub fn sheet_before(sheet: &SheetView, to: DVec3, radius_m: f64, skip: Skip) -> f64 {
+fn sheet_before(sheet: &SheetView, to: DVec3, radius_m: f64, skip: Skip) -> f64 {
     let beyond = smoothstep(0.0, BEHIND_SHEET, sheet.beyond_m(to) / radius_m);
     let sine = (radius_m / to.length()).min(1.0);
     let apart = -sine - SKIP_FADE_RAD.sin();
@@ -234,12 +234,6 @@ impl Cone {
     pub fn field_share(&self, skip: Skip) -> f64 {
         let sine = self.half_angle_rad.map_or(1.0, f64::sin);
         if skip.caps { smoothstep(CAP_SINES[0], CAP_SINES[1], sine) } else { 1.0 }
-    }
-
-    /// An occluder as a cap of this solid angle, sr.
-    pub fn cap_of(&self, solid_angle: f64) -> Cap {
-        let (sine, cosine) = self.half_angle_rad.map_or((1.0, 0.0), f64::sin_cos);
-        self.cap(solid_angle * (1.0 + cosine) / (2.0 * PI * sine * sine))
     }
 
     /// An occluder as a cap whose projected area is this share of its sphere's.

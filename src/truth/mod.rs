@@ -1,13 +1,12 @@
-//! The truth that pictures are compared with: the same scene lit by ray casting and by an exact band-limited chain.
+//! The truth that pictures are compared with: the same scene lit by ray casting.
 //!
 //! The rungs of the comparison, each with one more approximation than the previous one:
 //!
 //! | rung | what | where |
 //! |---|---|---|
 //! | T0 | rays against the placed meshes, full visibility: what they meet before a light's surface blocks it | [`raycast`] |
-//! | T1 | exact visibility of every occluder projected to SH, exact chain of products | [`exact`] |
-//! | T2 | fields looked up, f64 | [`crate::merge::twin`] |
-//! | T3 | the merge on the device, f32 | [`crate::merge`] |
+//! | T1 | fields looked up, f64 | [`crate::merge::twin`] |
+//! | T2 | the merge on the device, f32 | [`crate::merge`] |
 //!
 //! All rungs use the same rules as the merge for what emits, occludes and receives. A receiver does not occlude itself
 //! through its field; if it is neither flat nor convex, its self-shadowing is judged from
@@ -21,7 +20,6 @@
 pub mod difference;
 #[cfg(feature = "cli")]
 pub mod error_map;
-pub mod exact;
 pub mod exposure;
 pub mod flip;
 pub mod pixels;
@@ -33,7 +31,6 @@ pub mod world;
 
 #[cfg(feature = "cli")]
 pub use error_map::ErrorMap;
-pub use exact::ExactChain;
 pub use ray_mesh::RayMeshes;
 pub use raycast::{Estimate, RayCast};
 pub use world::World;

@@ -6,7 +6,7 @@ use super::sequence::Axes;
 use crate::asset::texture::Texture;
 use crate::bake::TRANSFER_OFFSET;
 use crate::field::lattice::cap_height;
-use crate::field::sheet::{self, Rectangle, Sheet, SheetEye, SheetView};
+use crate::field::sheet;
 use crate::scene::{Gloss, Placement, Scene};
 use glam::{DMat3, DVec3, Mat3A, Vec3A};
 use std::sync::Arc;
@@ -130,18 +130,6 @@ impl<'s> World<'s> {
     pub fn occluders(&self, view: &VertexView) -> Vec<EntityView> {
         let others = self.occluders.iter().filter(|&&j| j != view.entity);
         others.map(|&j| self.sight(j, self.beside(j, view))).collect()
-    }
-
-    /// An occluder as a vertex sees it, where it is a rectangle.
-    pub fn sheet(&self, occluder: usize, view: &VertexView) -> Option<SheetView> {
-        let Rectangle { axes, half_m } = self.scene.caster(self.scene.entities[occluder].mesh).rectangle()?;
-        let PlacedEntity { centre, radius_m, rotation, .. } = self.entities[occluder];
-        let own_radius_m = f64::from(self.scene.meshes[self.scene.entities[occluder].mesh].bounding_sphere().1);
-        let half_m = half_m.map(|half| half * radius_m / own_radius_m);
-        let sheet = Sheet { centre, rectangle: Rectangle { axes: axes.map(|axis| rotation * axis), half_m } };
-        let receiver = &self.entities[view.entity];
-        let receiver = (receiver.centre, receiver.radius_m);
-        Some(sheet.seen(&SheetEye { position: view.position, normal: view.normal, receiver }))
     }
 
     /// Where a vertex sees an occluder from: its own place, off the plane of a sheet ([`sheet::height_over`]).
@@ -324,11 +312,6 @@ impl VertexView {
 }
 
 impl EntityView {
-    /// Whether this occluder precedes a light in the merge's order.
-    pub fn precedes(&self, light: &EntityView) -> bool {
-        (self.distance_m, self.entity) < (light.distance_m, light.entity)
-    }
-
     /// Distances in metres between which all of the entity lies: those of its bounding sphere, of which the first is
     /// negative within it.
     pub fn range_m(&self) -> [f64; 2] {

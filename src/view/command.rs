@@ -26,7 +26,7 @@ pub enum Command {
     DragEnd,
     /// Turns an occluder into a light or a light into an occluder.
     ToggleLight,
-    /// Reverts the last change of the scene; if there is none, returns to the changed scene that this one replaced.
+    /// Reverts the last change of the scene.
     Undo,
     Redo,
     NextScene,

@@ -215,12 +215,6 @@ impl Editor {
             back
         };
         let found = self.history.travel(forth, swap);
-        if !found
-            && !forth
-            && let Some(effect) = self.return_to_former()
-        {
-            return effect;
-        }
         let message = (!found).then(|| format!("nothing to {}", if forth { "redo" } else { "undo" }));
         Effect { changed, message }
     }

@@ -40,8 +40,6 @@ pub struct Editor {
     pub(super) saved: HashSet<PathBuf>,
     /// The scene as it was opened or saved last.
     pub(super) kept: Data,
-    /// The last scene before this one that was changed.
-    pub(super) former: Option<Box<Editor>>,
 }
 
 /// Gives a scene without distant light a generated sky.
@@ -77,7 +75,6 @@ impl Editor {
             drag: None,
             saved: HashSet::new(),
             kept: scene.data.clone(),
-            former: None,
             path: path.to_owned(),
             scene,
         }
@@ -241,9 +238,9 @@ impl Editor {
         self.select(Some(next))
     }
 
-    /// Replaces the scene and keeps the window's state. Returns the old editor.
-    pub(super) fn replace(&mut self, next: Editor) -> Editor {
-        let next = Editor {
+    /// Replaces the scene and keeps the window's state.
+    pub(super) fn replace(&mut self, next: Editor) {
+        *self = Editor {
             size: self.size,
             running: self.running,
             reference: self.reference,
@@ -251,10 +248,9 @@ impl Editor {
             overlay: self.overlay,
             shows_keys: self.shows_keys,
             shows_figures: self.shows_figures,
-            saved: self.saved.clone(),
+            saved: std::mem::take(&mut self.saved),
             ..next
         };
-        std::mem::replace(self, next)
     }
 }
 

@@ -1,72 +1,20 @@
-//! Scenes: opened one after another, saved as files from which `render` makes the same picture, and rescued. A scene that
-//! was edited is kept when another opens, and undo returns to it.
+//! Scenes: opened one after another, saved as files from which `render` makes the same picture, and rescued.
 
 use super::command::{Changed, Effect};
 use super::editor::Editor;
-use super::pick::unbuilt_shapes;
-use crate::asset::{Mesh, embedded};
+use crate::asset::embedded;
 use crate::error::{Error, Result};
 use crate::scene::{Data, Scene};
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
 
-/// Largest number of changed scenes to which undo returns, one after the other.
-pub const FORMER_LIMIT: usize = 16;
 /// Suffix of a saved scene's name, so that the original file with its comments is kept.
 const SUFFIX: &str = "-edited";
 
 impl Editor {
-    /// Shows another scene in place of this one. If there are edits of this one that are not saved, the message says
-    /// how to return. Beyond [`FORMER_LIMIT`] scenes the oldest one goes: its edits are saved, and the message says
-    /// where.
-    pub fn open(&mut self, mut scene: Scene, path: &Path) -> Effect {
-        self.share_meshes(&mut scene);
-        let message = self
-            .is_edited()
-            .then(|| format!("the edits of {} are not saved: Ctrl-Z returns to them", self.path().display()));
-        let mut former = self.replace(Editor::new(scene, path));
-        former.shapes = unbuilt_shapes(&former.scene);
-        // Z is easily pressed instead of Ctrl-Z, and a file dropped by mistake.
-        let changed = former.undo_count() > 0 || former.is_edited();
-        self.former = if changed { Some(Box::new(former)) } else { former.former };
-        let message = self.let_go_of_oldest().or(message);
-        Effect { changed: Changed { scene: true, ..Changed::default() }, message }
-    }
-
-    /// Takes meshes of this scene for equal ones of the next, as a scene that is opened again has them.
-    fn share_meshes(&self, next: &mut Scene) {
-        for mesh in &mut next.meshes {
-            let is_same = |own: &&Arc<Mesh>| own.content_hash() == mesh.content_hash() && own == &mesh;
-            if let Some(own) = self.scene.meshes.iter().find(is_same) {
-                *mesh = own.clone();
-            }
-        }
-    }
-
-    /// Drops the oldest scene beyond the limit. One whose edits can be saved nowhere stays.
-    fn let_go_of_oldest(&mut self) -> Option<String> {
-        let mut last = self;
-        for _ in 0..FORMER_LIMIT {
-            last = last.former.as_deref_mut()?;
-        }
-        let mut oldest = last.former.take()?;
-        match oldest.rescue() {
-            Ok(paths) => {
-                let path = paths.first()?;
-                Some(format!("the edits of {} were saved as {}", oldest.path().display(), path.display()))
-            }
-            Err(error) => {
-                last.former = Some(oldest);
-                Some(error.to_string())
-            }
-        }
-    }
-
-    /// The files of scenes, this one and those that undo would return to, with edits that are not saved.
-    pub fn unsaved(&self) -> Vec<&Path> {
-        let mut paths = self.former.as_ref().map_or(Vec::new(), |former| former.unsaved());
-        paths.extend(self.is_edited().then_some(self.path()));
-        paths
+    /// Shows another scene in place of this one, whose edits are lost unless they are saved.
+    pub fn open(&mut self, scene: Scene, path: &Path) -> Effect {
+        self.replace(Editor::new(scene, path));
+        Changed { scene: true, ..Changed::default() }.into()
     }
 
     pub(super) fn next_scene(&mut self) -> Effect {
@@ -74,14 +22,6 @@ impl Editor {
             Ok((scene, path)) => self.open(scene, &path),
             Err(error) => Effect::said(error.to_string()),
         }
-    }
-
-    /// Returns to the last scene before this one that was changed.
-    pub(super) fn return_to_former(&mut self) -> Option<Effect> {
-        let former = self.former.take()?;
-        self.replace(*former);
-        let message = Some(format!("back to {}", self.path().display()));
-        Some(Effect { changed: Changed { scene: true, ..Changed::default() }, message })
     }
 
     /// The next built-in scene; the first one if this is not a built-in scene.
@@ -153,37 +93,25 @@ impl Editor {
         *now != Data { camera: now.camera.clone(), ..self.kept.clone() }
     }
 
-    /// Writes every edited scene, this one and the one that undo would return to, to a file that does not exist yet:
-    /// beside the scene's own file as [`Editor::save_path`] names it, or in the folder of temporary files if that
-    /// cannot be written. Returns the paths, which is none where nothing was edited.
-    pub fn rescue(&mut self) -> Result<Vec<PathBuf>> {
-        let mut paths = match &mut self.former {
-            Some(former) => former.rescue()?,
-            None => Vec::new(),
-        };
-        if self.is_edited() {
-            let first = self.numbered(&self.folder(), |path| !path.exists());
-            let path = match self.save(&first) {
-                Ok(()) => first,
-                Err(error) => {
-                    let second = self.numbered(&std::env::temp_dir(), |path| !path.exists());
-                    self.save(&second).map_err(|_| error)?;
-                    second
-                }
-            };
-            paths.push(path);
+    /// Writes an edited scene to a file that does not exist yet: beside the scene's own file as [`Editor::save_path`]
+    /// names it, or in the folder of temporary files if that cannot be written. Returns its path, or `None` where
+    /// nothing was edited.
+    pub fn rescue(&mut self) -> Result<Option<PathBuf>> {
+        if !self.is_edited() {
+            return Ok(None);
         }
-        Ok(paths)
+        let first = self.numbered(&self.folder(), |path| !path.exists());
+        let Err(error) = self.save(&first) else { return Ok(Some(first)) };
+        let second = self.numbered(&std::env::temp_dir(), |path| !path.exists());
+        self.save(&second).map_err(|_| error)?;
+        Ok(Some(second))
     }
 
     /// Saves edits before an error ends the window, and adds to its message where.
     pub fn rescued(&mut self, error: Error) -> Error {
         match self.rescue() {
-            Ok(paths) if paths.is_empty() => error,
-            Ok(paths) => {
-                let paths: Vec<_> = paths.iter().map(|path| path.display().to_string()).collect();
-                error.followed_by(format!("the edited scene was saved as {}", paths.join(" and ")))
-            }
+            Ok(None) => error,
+            Ok(Some(path)) => error.followed_by(format!("the edited scene was saved as {}", path.display())),
             Err(lost) => error.followed_by(format!("the edited scene could not be saved: {lost}")),
         }
     }

@@ -105,8 +105,8 @@ pub struct Viewer {
     pub(super) timings: VecDeque<Vec<Timing>>,
     pub(super) edges: HashMap<usize, Edges>,
     pub(super) quit: bool,
-    /// Whether it was said that closing loses edits, since the last edit.
-    pub(super) asked_to_close: bool,
+    /// Whether it was said that closing or another scene loses edits, since the last edit.
+    pub(super) asked_to_leave: bool,
     /// Width and height of the window's picture, pixels.
     pub(super) size: [u32; 2],
     /// Time at which the picture is refined, unless anything moves before.
@@ -153,7 +153,7 @@ impl Viewer {
             timings: VecDeque::new(),
             edges: HashMap::new(),
             quit: false,
-            asked_to_close: false,
+            asked_to_leave: false,
             size: editor.size(),
             refine_at: None,
             pace: Pace::default(),
@@ -279,7 +279,8 @@ impl Viewer {
             other => other,
         };
         match command {
-            Command::Quit => self.close(),
+            Command::NextScene if !self.may_leave() => return Ok(()),
+            Command::Quit => self.quit = self.may_leave(),
             Command::Save => self.save(),
             Command::Screenshot => {
                 let outcome = self.screenshot();
@@ -289,7 +290,7 @@ impl Viewer {
             _ => {}
         }
         let Effect { mut changed, message } = self.editor.apply(command);
-        self.asked_to_close &= !(changed.light() || changed.exposure);
+        self.asked_to_leave &= !(changed.light() || changed.exposure);
         if command == Command::ToggleReference {
             changed |= self.editor.apply(Command::Resize(self.own_size())).changed;
         }
@@ -348,7 +349,7 @@ impl Viewer {
 
     /// Shows another scene in place of this one: a scene file, a glTF file or an OBJ file, such as one that was dropped
     /// on the window. What is left out of it is said. A file that cannot be opened is one line over the picture, and
-    /// the scene stays. Edits that are not saved are kept: undo returns to them, and a line says so.
+    /// the scene stays, as it does at the first time where it has edits that are not saved.
     pub fn open(&mut self, path: &Path) -> Result<()> {
         let (scene, notes) = match self.read(path) {
             Ok(read) => read,
@@ -357,10 +358,13 @@ impl Viewer {
                 return Ok(());
             }
         };
+        if !self.may_leave() {
+            return Ok(());
+        }
+        self.asked_to_leave = false;
         notes.iter().for_each(|note| self.insist(format!("{}: {note}", path.display())));
         let effect = self.editor.open(scene, path);
         self.insist(format!("opened {}", path.display()));
-        effect.message.into_iter().for_each(|message| self.insist(message));
         self.input.commands(Event::Lost, &self.editor);
         self.follow(effect.changed)
     }
@@ -380,16 +384,15 @@ impl Viewer {
         Ok((scene, left_out.into_iter().chain(notes.said().iter().cloned()).chain(exposed).collect()))
     }
 
-    /// Ends the window, at the second time if there are edits that are not saved.
-    pub(super) fn close(&mut self) {
-        let unsaved = self.editor.unsaved();
-        if unsaved.is_empty() || self.asked_to_close {
-            self.quit = true;
-            return;
+    /// Whether the scene may go: at the second time if it has edits that are not saved.
+    fn may_leave(&mut self) -> bool {
+        if !self.editor.is_edited() || self.asked_to_leave {
+            return true;
         }
-        let unsaved: Vec<String> = unsaved.iter().map(|path| path.display().to_string()).collect();
-        self.asked_to_close = true;
-        self.insist(format!("unsaved edits of {}: Ctrl-S saves, Ctrl-Q again closes without", unsaved.join(" and ")));
+        self.asked_to_leave = true;
+        let path = self.editor.path().display();
+        self.insist(format!("unsaved edits of {path}: Ctrl-S saves, the same again goes on without"));
+        false
     }
 
     /// Runs the overlay on egui's input and executes the commands of its widgets.

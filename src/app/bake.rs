@@ -6,7 +6,6 @@ use super::source::GltfArguments;
 use super::{Global, output};
 use crate::asset::Mesh;
 use crate::asset::environment::RADIANCE_LIMIT;
-use crate::bake::silhouette::{SilhouetteOptions, bake_silhouette};
 use crate::bake::{self, BakeOptions};
 use crate::error::{Error, Result};
 use crate::field::FieldKind;
@@ -15,7 +14,7 @@ use crate::text::{number, triple};
 use clap::Args;
 use clap::builder::BoolishValueParser;
 use glam::Vec3;
-use serde_json::{Value, json};
+use serde_json::json;
 use std::path::{Path, PathBuf};
 
 #[derive(Args)]
@@ -32,10 +31,6 @@ pub struct Arguments {
     /// mesh's own colours if it has them. Example: 4,3,2
     #[arg(long, value_name = "R,G,B", value_parser = color, allow_hyphen_values = true)]
     radiance: Option<Vec3>,
-    /// Bake a silhouette field instead: outlines from many directions, for sharp lights. Of the baking options it takes
-    /// only --quality; the field has 98, 389 or 1 542 KiB, and half as much again if the mesh is not convex
-    #[arg(long, conflicts_with = "radiance")]
-    silhouette: bool,
     /// Draw fewer and larger triangles of a large mesh in place of those that are far from the eye. What is seen moves
     /// by at most 0.25 texels
     #[arg(long, action = clap::ArgAction::Set, default_value = "on", value_name = "on|off", value_parser = BoolishValueParser::new())]
@@ -49,8 +44,7 @@ pub struct Arguments {
 impl Arguments {
     fn options(&self) -> Result<bake::Options> {
         let options = self.bake.resolve()?;
-        let silhouette = SilhouetteOptions { levels: self.levels, ..options.silhouette };
-        Ok(bake::Options { silhouette, levels: self.levels, ..options })
+        Ok(bake::Options { levels: self.levels, ..options })
     }
 }
 
@@ -80,50 +74,31 @@ pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
     }
     let context = Context::new(global)?;
     let progress = |done, all| context.progress.show(&mesh.name, done, all);
-    let of_mesh = |error: Error| error.context(arguments.mesh.display());
-    let triangles = mesh.triangles.len();
     let out = &arguments.output;
-    if arguments.silhouette {
-        let (field, report) = bake_silhouette(&context.baker, &mesh, options.silhouette, &progress).map_err(of_mesh)?;
-        let header = &field.header;
-        let line = format!(
-            "{} maps of {1}x{1}, {triangles} triangles, {2} bytes, {3:.2} s",
-            header.map_count(),
-            header.map_px,
-            field.payload().len(),
-            report.total.as_secs_f64()
-        );
-        let json = json!({ "triangles": triangles, "report": report, "header": header });
-        return finish(global, context, out, || field.write(out), json, &line);
-    }
     let kind = if arguments.radiance.is_some() { FieldKind::Radiance } else { FieldKind::Occlusion };
     let wanted = bake::header(&mesh, kind, &options);
-    let (field, report) = context.baker.field(&mesh, wanted, &progress).map_err(of_mesh)?;
-    let line = format!(
-        "{} samples ({} filled, {} captured), {triangles} triangles, {} bytes, {:.2} s",
-        report.samples + report.filled,
-        report.filled,
-        field.header.captured_samples,
-        field.payload.len(),
-        report.total.as_secs_f64()
-    );
-    let json = json!({ "triangles": triangles, "report": report, "header": field.header });
-    finish(global, context, out, || field.write(out), json, &line)
-}
-
-/// Writes a field to `out` unless the validation layer objected to it, and says what was done.
-fn finish(
-    global: &Global,
-    context: Context,
-    out: &Path,
-    write: impl FnOnce() -> Result<()>,
-    mut json: Value,
-    line: &str,
-) -> Result<()> {
-    json["origin"] = context.origin(global);
-    json["file"] = out.display().to_string().into();
+    let baked = context.baker.field(&mesh, wanted, &progress);
+    let (field, report) = baked.map_err(|error| error.context(arguments.mesh.display()))?;
+    let triangles = mesh.triangles.len();
+    let origin = context.origin(global);
+    // A field that the validation layer objected to is not written.
     context.finish()?;
-    write().map_err(output::unwritten)?;
-    output::say(if global.json { json.to_string() } else { format!("{}: {line}", output::shown(out)) });
+    field.write(out).map_err(output::unwritten)?;
+    output::say(if global.json {
+        let file = out.display().to_string();
+        let header = &field.header;
+        json!({ "triangles": triangles, "report": report, "header": header, "origin": origin, "file": file })
+            .to_string()
+    } else {
+        format!(
+            "{}: {} samples ({} filled, {} captured), {triangles} triangles, {} bytes, {:.2} s",
+            output::shown(out),
+            report.samples + report.filled,
+            report.filled,
+            field.header.captured_samples,
+            field.payload.len(),
+            report.total.as_secs_f64()
+        )
+    });
     Ok(())
 }

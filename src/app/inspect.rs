@@ -3,10 +3,7 @@
 use super::outputs::{Output, Outputs};
 use super::sheet::Sheet;
 use super::{Global, output};
-use crate::asset::picture;
-use crate::error::{Error, Result, one_line};
-use crate::field::file;
-use crate::field::silhouette::{REACH, SILHOUETTE_MAGIC, Side, SilhouetteField};
+use crate::error::{Result, one_line};
 use crate::field::{FieldKind, ShadowField};
 use crate::sh::basis::{MAX_COEFFICIENTS, coefficient_count, evaluate};
 use crate::sh::cube;
@@ -27,11 +24,8 @@ pub struct Arguments {
     /// Print the field's coefficients at this place, in metres in the mesh's frame. Example: 0,1.5,2
     #[arg(long, value_name = "X,Y,Z", value_parser = place, allow_hyphen_values = true)]
     at: Option<DVec3>,
-    /// With --at: follow the ray from there in this direction, in the mesh's frame. A silhouette field needs it
-    #[arg(long, value_name = "X,Y,Z", value_parser = direction, allow_hyphen_values = true, requires = "at")]
-    toward: Option<DVec3>,
     /// Write a picture of the cubes that the coefficients describe (-X +Z +X -Z, +Y above, -Y below), over latitude,
-    /// longitude and distance; of a silhouette field, its maps
+    /// longitude and distance
     #[arg(long, value_name = "OUT.png")]
     faces: Option<PathBuf>,
 }
@@ -43,68 +37,47 @@ fn place(text: &str) -> std::result::Result<DVec3, String> {
     triple(number(-PLACE_LIMIT_M..=PLACE_LIMIT_M))(text).map(DVec3::from_array)
 }
 
-fn direction(text: &str) -> std::result::Result<DVec3, String> {
-    let toward = place(text)?;
-    if toward.length() > 1e-6 { Ok(toward) } else { Err(format!("expected a direction like 0,1,0.5, got \"{text}\"")) }
-}
-
-/// What is told of a field.
-struct About {
-    /// Its header and more, with "at" where a lookup is asked for.
-    json: Value,
-    lines: Vec<(&'static str, String)>,
-    /// The picture, where one is asked for.
-    sheet: Option<Sheet>,
-}
-
 pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
     if let Some(path) = &arguments.faces {
         Outputs::check(std::slice::from_ref(&arguments.field), &[Output::new("--faces", path, "png")])?;
     }
-    let is_silhouette = file::has_magic(&arguments.field, SILHOUETTE_MAGIC);
-    let about = if is_silhouette { about_silhouettes(arguments)? } else { about_field(arguments)? };
-    if let (Some(path), Some(sheet)) = (&arguments.faces, &about.sheet) {
-        sheet.write(path)?;
+    let field = ShadowField::read(&arguments.field)?;
+    if let Some(path) = &arguments.faces {
+        cubes(&field).write(path)?;
     }
+    let at = arguments.at.map(|position_m| lookup(&field, position_m));
     if global.json {
-        output::say(about.json.to_string());
+        let mut json = json!({
+            "file": arguments.field.display().to_string(),
+            "header": field.header,
+            "samples": field.header.lattice.sample_count(),
+            "stored_samples": field.header.lattice.stored_count(),
+            "payload_bytes": field.payload.len(),
+        });
+        if let Some(at) = at {
+            json["at"] = at;
+        }
+        output::say(json.to_string());
         return Ok(());
     }
-    for (name, value) in about.lines {
+    for (name, value) in lines(&field) {
         output::say(format!("{name:16} {value}"));
     }
-    if let Some(at) = about.json.get("at") {
+    if let Some(at) = at {
         output::say(format!("{:16} {at}", "at"));
     }
     Ok(())
 }
 
-fn mesh_line(mesh: &str, hash: &str) -> String {
-    format!("{} ({})", one_line(mesh), &hash[..16.min(hash.len())])
-}
-
-fn about_field(arguments: &Arguments) -> Result<About> {
-    if arguments.toward.is_some() {
-        return Err(Error::Usage("--toward goes with a silhouette field".into()));
-    }
-    let field = ShadowField::read(&arguments.field)?;
+fn lines(field: &ShadowField) -> Vec<(&'static str, String)> {
     let header = &field.header;
     let lattice = header.lattice;
-    let mut json = json!({
-        "file": arguments.field.display().to_string(),
-        "header": header,
-        "samples": lattice.sample_count(),
-        "stored_samples": lattice.stored_count(),
-        "payload_bytes": field.payload.len(),
-    });
-    if let Some(position_m) = arguments.at {
-        json["at"] = lookup(&field, position_m);
-    }
+    let hash = &header.mesh_hash;
     let shells: Vec<String> = (0..lattice.shells).map(|k| format!("{:.3}", lattice.shell(k))).collect();
     let storage = format!("{:?}", header.storage).to_lowercase();
     let mut lines = vec![
         ("kind", format!("{:?}", header.kind).to_lowercase()),
-        ("mesh", mesh_line(&header.mesh, &header.mesh_hash)),
+        ("mesh", format!("{} ({})", one_line(&header.mesh), &hash[..16.min(hash.len())])),
         ("bounding sphere", format!("centre {:?} m, radius {} m", header.centre_m, header.radius_m)),
         ("bands", format!("{} ({} coefficients a channel)", header.bands, header.bands * header.bands)),
         ("lattice", lattice.to_string()),
@@ -118,73 +91,7 @@ fn about_field(arguments: &Arguments) -> Result<About> {
     if header.kind == FieldKind::Radiance {
         lines.push(("radiance scale", header.radiance_scale.to_string()));
     }
-    Ok(About { json, lines, sheet: arguments.faces.is_some().then(|| cubes(&field)) })
-}
-
-fn about_silhouettes(arguments: &Arguments) -> Result<About> {
-    if arguments.at.is_some() && arguments.toward.is_none() {
-        return Err(Error::Usage("--at needs --toward X,Y,Z for a silhouette field".into()));
-    }
-    let field = SilhouetteField::read(&arguments.field)?;
-    let header = &field.header;
-    let mut json = json!({
-        "file": arguments.field.display().to_string(), "header": header, "maps": header.map_count(),
-        "payload_bytes": field.payload().len(),
-    });
-    if let (Some(position_m), Some(toward)) = (arguments.at, arguments.toward) {
-        json["at"] = follow(&field, position_m, toward.normalize());
-    }
-    let halves = header.half_px;
-    let lines = vec![
-        ("kind", "silhouette".to_owned()),
-        ("mesh", mesh_line(&header.mesh, &header.mesh_hash)),
-        ("bounding sphere", format!("centre {:?} m, radius {} m", header.centre_m, header.radius_m)),
-        ("directions", format!("{0} x {0} cells a cube face, {1} maps", header.cells, header.map_count())),
-        ("map", format!("{0} x {0} texels from views of {1} x {1} pixels", header.map_px, header.view_px)),
-        ("halves", if halves == 0 { "none".to_owned() } else { format!("{halves} x {halves} texels each") }),
-        ("stored", format!("{} bytes", field.payload().len())),
-    ];
-    Ok(About { json, lines, sheet: arguments.faces.is_some().then(|| maps(&field)) })
-}
-
-/// The outline near a ray, in metres, and what it leaves of small lights at infinity.
-fn follow(field: &SilhouetteField, position_m: DVec3, direction: DVec3) -> Value {
-    let radius_m = f64::from(field.header.radius_m);
-    let centre = DVec3::from_array(field.header.centre_m.map(f64::from));
-    let point = (position_m - centre) / radius_m;
-    let near = field.near(point, direction);
-    let outline = field.outline(&near, Side::Whole, direction);
-    let blocked = |angle_deg: f64| field.blocked(&near, direction, f64::INFINITY, angle_deg.to_radians().tan());
-    json!({
-        "position_m": position_m.to_array(), "direction": direction.to_array(),
-        "outline_distance_m": outline.distance * radius_m,
-        "outline_along_ray_m": (outline.depth - point.dot(direction)) * radius_m,
-        "blocked_of_light_of_1_3_8_deg": [blocked(1.0), blocked(3.0), blocked(8.0)],
-    })
-}
-
-/// All maps side by side: distances above, depths below.
-fn maps(field: &SilhouetteField) -> Sheet {
-    let edge = field.header.map_px as usize;
-    let count = field.header.map_count();
-    let columns = ((2 * count) as f64).sqrt().ceil() as usize;
-    let titles = [
-        format!("distance to the outline, black -{REACH} r outside to white {REACH} r inside"),
-        "depth of its nearest point, black -1 r to white 1 r along the light".to_owned(),
-    ];
-    let mut rows = Vec::new();
-    for (half, title) in titles.into_iter().enumerate() {
-        let level = |map: usize, texel: usize| {
-            let value = field.texel(map, Side::Whole, texel % edge, texel / edge)[half] / [REACH, 1.0][half];
-            [picture::linear_from_srgb(0.5 + 0.5 * value as f32); 3]
-        };
-        let tiles: Vec<Vec<_>> =
-            (0..count).map(|map| (0..edge * edge).map(|texel| level(map, texel)).collect()).collect();
-        rows.extend(tiles.chunks(columns).map(|tiles| (String::new(), tiles.to_vec())));
-        let first = rows.len() - count.div_ceil(columns);
-        rows[first].0 = title;
-    }
-    Sheet { tile: [edge; 2], rows }
+    lines
 }
 
 /// The coefficients at a place in the mesh's frame, in metres.

@@ -47,12 +47,6 @@ pub fn write<H: Serialize>(path: &Path, magic: [u8; 8], header: &H, payload: &[u
         .map_err(|error| Error::input(path, format!("cannot be written: {error}")))
 }
 
-/// Whether a file begins as one of that kind does; `false` where it cannot be read.
-pub fn has_magic(path: &Path, magic: [u8; 8]) -> bool {
-    let mut found = [0; 8];
-    files::open(path).and_then(|mut file| file.read_exact(&mut found)).is_ok() && found == magic
-}
-
 /// Reads what [`write()`] wrote. Lengths are checked against the file's size before memory is allocated for them.
 pub fn read<H: DeserializeOwned>(path: &Path, magic: [u8; 8]) -> Result<(H, Vec<u8>)> {
     let unread = |error| Error::input(path, format!("cannot be read: {error}"));

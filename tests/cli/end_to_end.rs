@@ -197,26 +197,6 @@ fn bake_and_inspect_a_sphere() {
 }
 
 #[test]
-fn silhouettes_are_baked_and_shown() {
-    let Some(folder) = Folder::with_device() else { return };
-    folder.write("t.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 3 1 4\n");
-    let ran = folder.good("bake t.obj -o t.sf --silhouette --quality draft");
-    assert!(ran.stdout.starts_with("t.sf: 49 maps of 32x32, "), "{}", ran.stdout);
-    let shown = folder.json("inspect t.sf --at 0.1,0.1,-2 --toward 0,0,1 --faces maps.png");
-    let number = |name: &str| shown["at"][name].as_f64().unwrap();
-    // The ray passes 0.1 m inside the two edges that meet in the corner at the origin.
-    assert!((number("outline_distance_m") - 0.1).abs() < 0.03, "{shown}");
-    // The outline there is a wall along the ray, from 2.0 to 2.9 m: its middle counts.
-    assert!((number("outline_along_ray_m") - 2.45).abs() < 0.1, "{shown}");
-    assert_eq!(shown["maps"], 49);
-    assert!(folder.read("maps.png").starts_with(b"\x89PNG"));
-    for (alone, named) in [("--at 0,0,0", "--toward"), ("--toward 0,0,1", "--at")] {
-        let ran = folder.run(&format!("inspect t.sf {alone}"));
-        assert!(ran.code == 2 && ran.stderr.contains(named), "{alone}: {} {}", ran.code, ran.stderr);
-    }
-}
-
-#[test]
 fn devices_lists_the_one_that_is_taken() {
     let Some(folder) = Folder::with_device() else { return };
     let list = folder.json("devices");

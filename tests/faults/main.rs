@@ -77,17 +77,12 @@ fn bake(folder: &Path) -> Result<()> {
     run(folder, &[&["bake", "@mesh.obj", "-o", "@f.sf", "--radiance", "2,1,1"], &SMALL[..]].concat())
 }
 
-fn silhouettes(folder: &Path) -> Result<()> {
-    run(folder, &["bake", "@mesh.obj", "-o", "@s.sf", "--silhouette", "--quality", "draft"])
-}
-
 /// Where only some calls fail, the others do in a job before.
 const JOBS: &[Job] = &[
     Job { name: "picture", run: picture, outputs: &["p.png", "p.exr", "v.csv"], cold: &["cache/fields"], only: None },
     Job { name: "pixels", run: pixels, outputs: &["x.png"], cold: &[], only: Some(&["Graphics", "ShaderModule"]) },
     Job { name: "animation", run: animation, outputs: &["a.png"], cold: &[], only: None },
     Job { name: "bake", run: bake, outputs: &["f.sf"], cold: &[], only: None },
-    Job { name: "silhouettes", run: silhouettes, outputs: &["s.sf"], cold: &[], only: None },
     #[cfg(feature = "view")]
     Job { name: "window", run: window::run, outputs: &["w.raw"], cold: &[], only: None },
 ];

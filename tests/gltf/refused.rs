@@ -216,7 +216,6 @@ fn commands_agree() {
         "import cut.glb -o out.toml",
         "render cut.glb -o out.png",
         "bake cut.glb -o out.sf",
-        "bake cut.glb -o out.sf --silhouette",
         "bench time-error cut.glb --out out",
         #[cfg(feature = "view")]
         "view cut.glb",

@@ -5,7 +5,7 @@ use crate::error::{Error, Result};
 use crate::field::quantity::channel_stride;
 use crate::field::self_visibility;
 use crate::files;
-use crate::gpu::shader::{ShaderSource, gather};
+use crate::gpu::shader::ShaderSource;
 use crate::gpu::{Shader, Stage};
 use crate::layout::{self, shared_macros};
 use crate::sh;
@@ -163,14 +163,6 @@ impl Library {
         let source =
             ShaderSource { name: row.file, stage, text: self.text(row.file)?, defines: &defines, include: &include };
         Shader::compile(&source, self.cache_dir.as_deref())
-    }
-
-    /// An entry point's file and every file that it includes, directly or indirectly, without generated includes.
-    pub fn files(&self, entry: &str) -> Vec<String> {
-        let text = |name: &str| Some(self.text(name).unwrap_or_default());
-        let included = gather(entry, &text(entry).unwrap_or_default(), &text).unwrap_or_default();
-        let names = included.into_keys().filter(|name| !name.starts_with("generated/"));
-        names.chain([entry.to_owned()]).collect()
     }
 
     fn text(&self, name: &str) -> Result<String> {

@@ -1,4 +1,4 @@
-//! Changes between frames: the scene's lights and camera, and shader files.
+//! Changes between frames: the scene's lights and camera.
 
 use super::permutation::{harmonic_lights, usable};
 use super::{Frame, albedos, methods, permutation};
@@ -7,7 +7,7 @@ use crate::error::Result;
 use crate::merge::Merge;
 use crate::merge::variant::MergePermutation;
 use crate::scene::{Camera, Entity, Scene};
-use crate::sharp::{Sharp, SharpPermutation};
+use crate::sharp::SharpPermutation;
 
 impl Frame {
     /// Whether the fields that `scene` needs are here, and the passes that its sharp lights need; it has the meshes and
@@ -69,43 +69,5 @@ impl Frame {
     /// least one.
     pub fn set_batch(&mut self, triangles: u32) {
         self.picture.draw.batch_triangles = triangles.max(1);
-    }
-
-    /// Builds anew what is made from any of the shader files named. What does not compile stays as it was.
-    pub fn reload(&mut self, changed: &[String]) -> Result<()> {
-        let library = self.library.clone();
-        let uses = |entry: &str| library.files(entry).iter().any(|file| changed.contains(file));
-        let draws = |part: &str| uses(&format!("{part}.vert")) || uses(&format!("{part}.frag"));
-        if ["draw", "grid", "triangle", "smooth"].into_iter().any(draws) {
-            self.refine(false)?;
-            let mut drawer = self.drawer(&self.options)?;
-            // Shaders that fail do so now.
-            self.make_pipelines_of(&drawer.draw)?;
-            drawer.draw.is_made = true;
-            self.exchange(drawer);
-            self.picture.other = None;
-        }
-        if uses("gloss.comp")
-            && let Some(reflections) = &mut self.reflections
-        {
-            reflections.rebuild(&self.library)?;
-        }
-        if ["runs.comp", "bounce.comp", "outgoing.comp", "distant.comp", "movers.comp"].into_iter().any(uses)
-            && let Some(bounce) = &mut self.bounce
-        {
-            bounce.rebuild(&self.device, &self.library)?;
-            self.forget();
-        }
-        if uses("sharp.comp")
-            && let Some(sharp) = &mut self.sharp
-        {
-            *sharp = Sharp::new(&self.device, &self.library, sharp.permutation)?;
-            self.forget();
-        }
-        if uses("merge.comp") {
-            self.merge = Merge::new(&self.device, &self.library, self.merge.permutation)?;
-            self.forget();
-        }
-        Ok(())
     }
 }

@@ -64,14 +64,10 @@ fn readback(device: &Arc<Device>, [width, height]: [u32; 2]) -> Result<Buffer> {
 
 impl Frame {
     /// Makes the pipelines of all that pictures of light show, before the first one.
-    pub(super) fn make_pipelines(&mut self) -> Result<()> {
-        if !std::mem::replace(&mut self.picture.draw.is_made, true) {
-            self.make_pipelines_of(&self.picture.draw)?;
+    pub fn make_pipelines(&mut self) -> Result<()> {
+        if std::mem::replace(&mut self.picture.draw.is_made, true) {
+            return Ok(());
         }
-        Ok(())
-    }
-
-    pub(super) fn make_pipelines_of(&self, draw: &Draw) -> Result<()> {
         let is_grid = |entity: &usize| self.buffers.surface(*entity).drawn.grid().is_some();
         let (grids, triangles): (Vec<usize>, Vec<usize>) = (0..self.scene.entities.len()).partition(is_grid);
         let surface = |index: usize| DrawnSurface {
@@ -80,7 +76,7 @@ impl Frame {
             transparent: self.scene.entities[index].transparent,
         };
         let surfaces: HashSet<DrawnSurface> = triangles.into_iter().map(surface).collect();
-        draw.make(surfaces, !grids.is_empty())
+        self.picture.draw.make(surfaces, !grids.is_empty())
     }
 
     /// Input of [`super::record()`] for the picture that was prepared last; `white` as in [`Frame::render`].
@@ -118,7 +114,7 @@ impl Frame {
         halves.chunks_exact(4).flat_map(|p| [p[0].to_f32(), p[1].to_f32(), p[2].to_f32()]).collect()
     }
 
-    pub(super) fn drawer(&self, options: &Options) -> Result<Drawer> {
+    fn drawer(&self, options: &Options) -> Result<Drawer> {
         let sharp = self.sharp.as_ref().map(|sharp| sharp.permutation);
         let pixels = pixel_shading(&self.device, options, &self.buffers, self.radiosity.soft(), sharp);
         let lights = PictureLights { pixels, highlights: sharp };
@@ -127,7 +123,7 @@ impl Frame {
     }
 
     /// Makes pictures that way from now on. Returns the way in which they were made so far.
-    pub(super) fn exchange(&mut self, drawer: Drawer) -> Drawer {
+    fn exchange(&mut self, drawer: Drawer) -> Drawer {
         Drawer {
             draw: std::mem::replace(&mut self.picture.draw, drawer.draw),
             pixels: std::mem::replace(&mut self.pixels, drawer.pixels),

@@ -186,14 +186,6 @@ impl Reflections {
         })
     }
 
-    /// Compiles the shader anew, from files that have changed.
-    pub fn rebuild(&mut self, library: &Library) -> Result<()> {
-        let device = self.groups.device().clone();
-        let shader = library.shader(&gloss_row(self.texels))?;
-        self.pipeline = ComputePipeline::new(&device, "gloss", &shader)?;
-        Ok(())
-    }
-
     /// Takes over distant light.
     pub fn set_sky(&mut self, environment: &Environment) -> Result<()> {
         self.sky = FilteredSky::new(&self.groups.device().clone(), environment)?;

@@ -79,7 +79,7 @@ impl Shader {
 }
 
 /// Every file that a text includes, directly or indirectly, by name; `include` gives the text of one.
-pub fn gather(name: &str, text: &str, include: &dyn Fn(&str) -> Option<String>) -> Result<BTreeMap<String, String>> {
+fn gather(name: &str, text: &str, include: &dyn Fn(&str) -> Option<String>) -> Result<BTreeMap<String, String>> {
     fn visit(
         chain: &mut Vec<String>,
         text: &str,

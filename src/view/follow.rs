@@ -166,46 +166,57 @@ impl Viewer {
     }
 
     pub(super) fn build(&mut self) -> Result<()> {
-        self.settle()?;
-        let options = frame::Options { size: self.size, ..self.setup.frame };
-        let built = Frame::new(&self.baker, &self.setup.cache, self.editor.scene(), options, &|_, _, _| ());
+        let built = self.new_frame();
         if let Some(frame) = self.tolerate(built)? {
             log::info!("ready: the first picture of {}", self.editor.path().display());
-            self.frame = Some(frame);
-            self.preview = None;
-            self.build_count += 1;
-            self.drawn_before = Some(self.frame_count);
-            self.pending |= Changed { placements: true, camera: true, ..Changed::default() };
-            self.version += 1;
+            self.take(frame);
         }
         Ok(())
     }
 
+    /// A frame of the scene, whose fields are cached.
+    fn new_frame(&mut self) -> Result<Frame> {
+        self.settle()?;
+        let options = frame::Options { size: self.size, ..self.setup.frame };
+        Frame::new(&self.baker, &self.setup.cache, self.editor.scene(), options, &|_, _, _| ())
+    }
+
+    fn take(&mut self, frame: Frame) {
+        self.frame = Some(frame);
+        self.preview = None;
+        self.build_count += 1;
+        self.drawn_before = Some(self.frame_count);
+        self.pending |= Changed { placements: true, camera: true, ..Changed::default() };
+        self.version += 1;
+    }
+
+    /// Compiles all shaders anew after a change of their files. Where one does not compile, what there was stays.
     pub(super) fn reload(&mut self, files: &[String]) {
-        let library = &self.setup.library;
-        let uses = |entry: &str| library.files(entry).iter().any(|file| files.contains(file));
-        let show = if uses("show.vert") || uses("show.frag") {
-            Show::new(&self.setup.device, library, self.setup.format).map(|show| self.show = show)
-        } else {
-            Ok(())
-        };
-        let overlay = if uses("overlay.vert") || uses("overlay.frag") { self.overlay.reload(library) } else { Ok(()) };
-        let frame = self.frame.as_mut().map_or(Ok(()), |frame| frame.reload(files));
-        self.baker = Baker::new(&self.setup.device, library);
-        let errors: Vec<String> =
-            [show, overlay, frame].into_iter().filter_map(|r| r.err().map(|e| e.to_string())).collect();
-        if errors.is_empty() {
-            log::info!("shaders rebuilt: {}", files.join(", "));
-            self.say(Some(format!("shaders rebuilt: {}", files.join(", "))));
-            self.shader_error = None;
-            if let Some(watch) = &mut self.watch {
-                watch.compiled();
+        self.baker = Baker::new(&self.setup.device, &self.setup.library);
+        match self.try_reload() {
+            Ok(()) => {
+                log::info!("shaders rebuilt: {}", files.join(", "));
+                self.say(Some(format!("shaders rebuilt: {}", files.join(", "))));
+                self.shader_error = None;
             }
-        } else {
-            errors.iter().flat_map(|error| error.lines()).for_each(|line| log::warn!("{line}"));
-            self.shader_error = Some(errors.join("\n"));
+            Err(error) => {
+                error.to_string().lines().for_each(|line| log::warn!("{line}"));
+                self.shader_error = Some(error.to_string());
+            }
         }
-        self.pending |= Changed { placements: true, display: true, ..Changed::default() };
+        self.pending.display = true;
+    }
+
+    fn try_reload(&mut self) -> Result<()> {
+        let show = Show::new(&self.setup.device, &self.setup.library, self.setup.format)?;
+        self.overlay.reload(&self.setup.library)?;
+        if self.frame.is_some() {
+            let mut frame = self.new_frame()?;
+            frame.make_pipelines()?;
+            self.take(frame);
+        }
+        self.show = show;
+        Ok(())
     }
 
     /// Decides whether the next picture is refined; `moves` if it differs from the last in more than the overlay.

@@ -12,18 +12,15 @@ pub struct Watch {
     folder: PathBuf,
     stamps: Stamps,
     looked: Instant,
-    /// Files that changed since they were last compiled without an error.
-    changed: BTreeSet<String>,
 }
 
 impl Watch {
     /// Starts watching; the present files count as compiled.
     pub fn new(folder: &Path) -> Self {
-        Watch { folder: folder.to_owned(), stamps: stamps(folder), looked: Instant::now(), changed: BTreeSet::new() }
+        Watch { folder: folder.to_owned(), stamps: stamps(folder), looked: Instant::now() }
     }
 
-    /// If a file changed since the last poll, returns all files that changed since the last call of
-    /// [`Watch::compiled`].
+    /// The files that changed since the last poll, if any did.
     pub fn poll(&mut self) -> Option<Vec<String>> {
         if self.looked.elapsed() < PERIOD {
             return None;
@@ -31,19 +28,10 @@ impl Watch {
         self.looked = Instant::now();
         let now = stamps(&self.folder);
         let names: BTreeSet<&String> = now.keys().chain(self.stamps.keys()).collect();
-        let fresh: Vec<String> =
+        let changed: Vec<String> =
             names.into_iter().filter(|name| now.get(*name) != self.stamps.get(*name)).cloned().collect();
         self.stamps = now;
-        if fresh.is_empty() {
-            return None;
-        }
-        self.changed.extend(fresh);
-        Some(self.changed.iter().cloned().collect())
-    }
-
-    /// Notes that all changed files have compiled.
-    pub fn compiled(&mut self) {
-        self.changed.clear();
+        (!changed.is_empty()).then_some(changed)
     }
 }
 

@@ -1,10 +1,10 @@
 //! Wavefront OBJ: a checking reader around `tobj`.
 //!
-//! The reader accepts `v x y z [w | r g b]` (colours are linear emission), `vt u [v [w]]`, `vn`, and `f` with any number of
-//! corners, as `v`, `v/vt`, `v//vn` or `v/vt/vn`, counted from 1 or from the end (-1). Groups, objects, materials, points
-//! and lines are skipped: the file is one mesh. If any corner lacks a normal, all normals are computed; vertices are then
-//! smooth where faces share an index. If any lacks texture coordinates, the mesh has none. Faces of more than three corners become fans, so they
-//! should be convex.
+//! The reader accepts `v x y z [w | r g b]` (colours are linear emission), `vt u [v [w]]`, `vn`, and `f` with any
+//! number of corners, as `v`, `v/vt`, `v//vn` or `v/vt/vn`, counted from 1 or from the end (-1). Groups, objects,
+//! materials, points and lines are skipped: the file is one mesh. If any corner lacks a normal, all normals are
+//! computed; vertices are then smooth where faces share an index. If any lacks texture coordinates, the mesh has none.
+//! Faces of more than three corners become fans, so they should be convex.
 //!
 //! `tobj` accepts NaN and indices past the end (some of which it wraps around), panics on faces without corners, and
 //! invents missing normals. So every line is checked here first, which also provides the line numbers for messages, and

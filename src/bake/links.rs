@@ -3,9 +3,10 @@
 //!
 //! Nothing of a group moves against it, so what a vertex sees is decided when its own visibility is baked, by the same
 //! rays. Each ray that meets a front has a share of the cosine-weighted hemisphere, and goes to the run of
-//! [`RUNS`]`[0]` vertices around the place that it meets. Runs that are too small as seen from the vertex become parts of
-//! larger ones, if those are seen too, and all that light from a far wall takes is one link (Hanrahan, Salzman, Aupperle, *A Rapid Hierarchical
-//! Radiosity Algorithm*, 1991). The sum of a vertex's links is the share of the hemisphere that shows fronts of the group.
+//! [`RUNS`]`[0]` vertices around the place that it meets. Runs that are too small as seen from the vertex become parts
+//! of larger ones, if those are seen too, and all that light from a far wall takes is one link (Hanrahan, Salzman,
+//! Aupperle, *A Rapid Hierarchical Radiosity Algorithm*, 1991). The sum of a vertex's links is the share of the
+//! hemisphere that shows fronts of the group.
 
 use std::ops::Range;
 

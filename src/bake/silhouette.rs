@@ -259,7 +259,8 @@ fn drawn_triangles<'m>(
     Ok(Cow::Owned(baker.leveled(mesh)?.within(header.level_pixels * pixel)))
 }
 
-/// Bakes the silhouette field of a mesh, on the device but for convex solids of few faces; `progress` hears of maps. Returns the report of the bake too.
+/// Bakes the silhouette field of a mesh, on the device but for convex solids of few faces; `progress` hears of maps.
+/// Returns the report of the bake too.
 pub fn bake_silhouette(
     baker: &Baker,
     mesh: &Mesh,

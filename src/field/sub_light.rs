@@ -1,4 +1,5 @@
-//! A ball, a panel or a tube of light cut into small round lights, so that several occluders and wide lights come out right.
+//! A ball, a panel or a tube of light cut into small round lights, so that several occluders and wide lights come out
+//! right.
 //!
 //! One straight edge before a disc is exact only where the occluder's outline is straight over the whole light, and two
 //! occluders multiply only where each blocks its share of every part alike. Both get better as the parts get smaller.

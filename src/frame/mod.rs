@@ -2,8 +2,9 @@
 //! order, with all barriers between them. The other files prepare what those passes read.
 //!
 //! ```text
-//! placements -> what an entity is now (pose) -> dirty clusters, chains of pixels, outlines (prepare) -> record -> window, image or file
-//!            -> what each viewport shows of it (viewport) --------------------------------------^
+//! placements -> what an entity is now (pose) -> dirty clusters, chains of pixels, outlines (prepare) -> record
+//!            -> what each viewport shows of it (viewport) --------------------------------------------> record
+//! record -> window, image or file
 //! ```
 
 mod change;

@@ -150,7 +150,8 @@ pub struct DrawnReflections<'b> {
 }
 
 impl Reflections {
-    /// For the glossy receivers of a scene of `entity_count` entities, whose buffers of light hold `light_bytes`; `texels` where the device reads texels faster than blocks.
+    /// For the glossy receivers of a scene of `entity_count` entities, whose buffers of light hold `light_bytes`;
+    /// `texels` where the device reads texels faster than blocks.
     pub fn new(
         device: &Arc<Device>,
         library: &Library,

@@ -1,9 +1,9 @@
 //! What a frame leaves out: one row a skip, and the thresholds.
 //!
 //! Most skips change no number: what they leave out contributes exactly zero, was computed before or is not seen.
-//! `horizon`, `cones`, `caps` and `static` change numbers a little. `horizon` and `cones` follow from true visibility, which
-//! makes what they leave out zero; the band-limited product is not zero there, so each fades out over [`SKIP_FADE_RAD`]
-//! beyond its threshold.
+//! `horizon`, `cones`, `caps` and `static` change numbers a little. `horizon` and `cones` follow from true visibility,
+//! which makes what they leave out zero; the band-limited product is not zero there, so each fades out over
+//! [`SKIP_FADE_RAD`] beyond its threshold.
 //!
 //! A new skip touches this table, the shader that its row names, and a test. Some skips have no switch: spots whose cone
 //! a cluster is out of, entities whose field holds nothing but zeros, fields that no receiver sees, and what is bounded

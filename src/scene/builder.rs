@@ -101,9 +101,9 @@ impl SceneBuilder {
     /// Checks everything and builds the meshes.
     ///
     /// # Errors
-    /// [`Error::Input`] in one line that names the mesh, the entity or the table: a number out of the range that docs/scene.md
-    /// states for scene files, two meshes of one name, an entity without its mesh, a mesh that its generator refuses,
-    /// or more of either than a scene may have.
+    /// [`Error::Input`] in one line that names the mesh, the entity or the table: a number out of the range that
+    /// docs/scene.md states for scene files, two meshes of one name, an entity without its mesh, a mesh that its
+    /// generator refuses, or more of either than a scene may have.
     pub fn build(self) -> Result<Scene> {
         let SceneBuilder { camera, output, environment, textures: painted, meshes: shapes, entities } = self;
         check_counts(shapes.len(), entities.len()).map_err(Error::Input)?;

@@ -1,5 +1,5 @@
-//! The tables of a scene file. `docs/scene.md` has a table of all keys with units, ranges and defaults; a test compares it with
-//! this file.
+//! The tables of a scene file. `docs/scene.md` has a table of all keys with units, ranges and defaults; a test compares
+//! it with this file.
 //!
 //! ```toml
 //! [camera]
@@ -34,11 +34,13 @@
 //! emission = [40, 36, 30]                    # makes it a light; emits, occludes and receives override the defaults
 //! spot = { inner_deg = 20, outer_deg = 35 }  # its light shines along its own +y alone
 //! motion = [                                 # applied from first to last; each is a function of time alone
-//!     { keyframes = { repeat = true, interpolation = "smooth", keys = [    # Catmull-Rom, or "linear"; rotations use slerp
-//!         { time_s = 0, position = [0, 0.6, 0] }, { time_s = 2, position = [1, 0.9, 0] }, { time_s = 4, position = [0, 0.6, 0] } ] } },
+//!     { keyframes = { repeat = true, interpolation = "smooth", keys = [  # Catmull-Rom or "linear"; rotations use slerp
+//!         { time_s = 0, position = [0, 0.6, 0] }, { time_s = 2, position = [1, 0.9, 0] },
+//!         { time_s = 4, position = [0, 0.6, 0] } ] } },
 //!     { orbit = { centre = [0, 0, 0], period_s = 8 } }, { spin = { axis = [0, 1, 0], period_s = 4 } },
 //!     { bob = { amplitude_m = 0.1, period_s = 3 } },
-//!     { node = { position = [0, 1, 0], rotation_keys = { times_s = [0, 1], values = [[0, 0, 0, 1], [0, 1, 0, 0]], period_s = 2 } } },
+//!     { node = { position = [0, 1, 0], rotation_keys = { times_s = [0, 1], period_s = 2, values = [
+//!         [0, 0, 0, 1], [0, 1, 0, 0] ] } } },
 //! ]                                          # a node carries what stands in it; keys are "step", "linear" or "cubic"
 //! ```
 

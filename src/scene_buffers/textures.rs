@@ -13,8 +13,8 @@ const WHITE: [u8; 4] = [u8::MAX; 4];
 /// sRGB and alpha.
 const FORMAT: vk::Format = vk::Format::R8G8B8A8_SRGB;
 
-/// Uploads textures, which hold numbers or else sRGB colours; those of one picture and one way to go on share what is uploaded. Pictures that are larger than the
-/// device's are halved.
+/// Uploads textures, which hold numbers or else sRGB colours; those of one picture and one way to go on share what is
+/// uploaded. Pictures that are larger than the device's are halved.
 pub fn upload(
     device: &Arc<Device>,
     textures: &[Arc<Texture>],

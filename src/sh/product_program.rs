@@ -1,9 +1,10 @@
 //! Multiplication by 1 - b as straight-line code, `t -= product(t, b)`. A program has the inputs t, here called a, and
 //! b, and the outputs t.
 //!
-//! `p_ij = a_i b_j + a_j b_i` is formed once for every unordered pair, then `c_k += G_ijk p_ij`; products with coefficient 0 scale by Y00, which is applied once to `a_0` and `b_0`. Where several `c_k`
-//! contain two pairs in the same proportion, `p + ratio q` is formed once (the linear half of the greedy factoring of
-//! reference 3 of [`crate::sh`]). At 4 bands that takes 394 multiply-adds.
+//! `p_ij = a_i b_j + a_j b_i` is formed once for every unordered pair, then `c_k += G_ijk p_ij`; products with
+//! coefficient 0 scale by Y00, which is applied once to `a_0` and `b_0`. Where several `c_k` contain two pairs in the
+//! same proportion, `p + ratio q` is formed once (the linear half of the greedy factoring of reference 3 of
+//! [`crate::sh`]). At 4 bands that takes 394 multiply-adds.
 
 use std::collections::BTreeMap;
 

@@ -19,7 +19,8 @@
 //! | alpha blending, transmission | opacity, of transmission less the luminance of what passes: glass is thin and grey |
 //! | roughness, metal, index of refraction, specular factor | gloss |
 //! | textures of roughness and metal, of normals | maps |
-//! | emissive factor and strength; texture | emission; of flat shapes the mean and a map, of others colours of the mesh's vertices, and a map |
+//! | emissive factor and strength | emission |
+//! | emissive texture | of flat shapes the mean and a map, of others colours of the mesh's vertices and a map |
 //! | point and spot lights | glowing balls; those of spots shine within a cone |
 //! | the first directional light | the sun of the distant light |
 //! | no light | daylight; a dim uniform sky beside lamps and suns |

@@ -13,15 +13,6 @@ pub const STEP_LIMIT: usize = 256;
 /// Largest number of entities that all changes together keep: at least 100 MB.
 const ENTITY_LIMIT: usize = 1 << 18;
 
-/// The parts of a scene that a change concerns, at one time.
-#[derive(Default)]
-pub(super) struct Snapshot {
-    pub entities: Vec<(usize, EntityData)>,
-    /// Distant light.
-    pub environment: Option<EnvironmentData>,
-    pub exposure_ev: Option<f32>,
-}
-
 /// Kind of a change. Consecutive changes of the same kind may be undone as one.
 #[derive(Clone, Copy, PartialEq)]
 pub(super) enum EditKind {
@@ -39,24 +30,25 @@ pub(super) enum EditKind {
 /// The changes that can be undone and redone.
 #[derive(Default)]
 pub(super) struct History {
-    done: Vec<Snapshot>,
-    undone: Vec<Snapshot>,
+    /// The scene before each change.
+    done: Vec<Data>,
+    undone: Vec<Data>,
     /// Kind and selection of the last change, while further changes of this kind may join it.
     open: Option<(EditKind, Option<usize>)>,
 }
 
 impl History {
-    /// Notes that a change of `kind` follows; `before` makes a snapshot of what it will change. If `joins`, and the
-    /// last change had the same kind and selection, the change becomes part of the last one.
-    pub fn note(&mut self, kind: EditKind, selection: Option<usize>, joins: bool, before: impl FnOnce() -> Snapshot) {
+    /// Notes that a change of `kind` follows. If `joins`, and the last change had the same kind and selection, the change
+    /// becomes part of the last one.
+    pub fn note(&mut self, kind: EditKind, selection: Option<usize>, joins: bool, before: &Data) {
         if joins && self.open == Some((kind, selection)) {
             return;
         }
         self.open = Some((kind, selection));
         self.undone.clear();
-        self.done.push(before());
-        let held = |steps: &[Snapshot]| steps.iter().map(|s| s.entities.len()).sum::<usize>();
-        while self.done.len() > STEP_LIMIT || (self.done.len() > 1 && held(&self.done) > ENTITY_LIMIT) {
+        self.done.push(before.clone());
+        let most = (ENTITY_LIMIT / before.entities.len().max(1)).clamp(1, STEP_LIMIT);
+        if self.done.len() > most {
             self.done.remove(0);
         }
     }
@@ -66,14 +58,13 @@ impl History {
         self.open = None;
     }
 
-    /// Undoes the last change, or redoes the one that was undone last: `swap` restores a snapshot and returns the
-    /// replaced state. Returns whether there was one.
-    pub fn travel(&mut self, forth: bool, swap: impl FnOnce(Snapshot) -> Snapshot) -> bool {
+    /// The scene before the last change, or after the one that was undone last; `None` if there was none.
+    pub fn travel(&mut self, forth: bool, now: &Data) -> Option<Data> {
         self.open = None;
         let (from, to) = if forth { (&mut self.undone, &mut self.done) } else { (&mut self.done, &mut self.undone) };
-        let Some(snapshot) = from.pop() else { return false };
-        to.push(swap(snapshot));
-        true
+        let there = from.pop()?;
+        to.push(now.clone());
+        Some(there)
     }
 
     pub fn undo_count(&self) -> usize {
@@ -102,7 +93,7 @@ impl Editor {
         let Some(index) = self.selection else {
             return Effect::said("select an entity first: click it, or Q / A");
         };
-        self.note_entities(EditKind::Role, false, &[index]);
+        self.history.note(EditKind::Role, self.selection, false, &self.scene.data);
         let mut data = self.scene.data.entities[index].clone();
         if self.scene.entities[index].emits {
             self.former_emission[index] = Some(data.emission).filter(|e| *e != Vec3::ZERO);
@@ -146,7 +137,7 @@ impl Editor {
         let Some(now) = self.light_ev().filter(|_| (-16.0..=32.0).contains(&ev)) else { return Effect::default() };
         let lights = self.lights();
         let factor = (ev - now).exp2();
-        self.note_entities(EditKind::Light, true, &lights);
+        self.history.note(EditKind::Light, self.selection, true, &self.scene.data);
         for index in lights {
             let mut data = self.scene.data.entities[index].clone();
             data.emission *= factor;
@@ -159,64 +150,49 @@ impl Editor {
         if !(-32.0..=32.0).contains(&ev) || ev == self.exposure_ev() {
             return Effect::default();
         }
-        let before = Snapshot { exposure_ev: Some(self.exposure_ev()), ..Snapshot::default() };
-        self.history.note(EditKind::Exposure, None, true, || before);
+        self.history.note(EditKind::Exposure, None, true, &self.scene.data);
         self.scene.data.output.exposure_ev = Some(ev);
         Changed { exposure: true, ..Changed::default() }.into()
     }
 
     fn set_environment(&mut self, kind: EditKind, change: impl FnOnce(&mut EnvironmentData)) -> Effect {
-        let before = self.scene.data.environment.clone();
-        let mut after = before.clone();
+        let before = self.scene.data.clone();
+        let mut after = before.environment.clone();
         change(&mut after);
-        if after == before {
+        if after == before.environment {
             return Effect::default();
         }
         if let Err(error) = self.scene.set_environment(&after) {
             return Effect::said(error.to_string());
         }
-        let before = Snapshot { environment: Some(before), ..Snapshot::default() };
-        self.history.note(kind, None, true, || before);
+        self.history.note(kind, None, true, &before);
         Changed { sky: true, ..Changed::default() }.into()
     }
 
-    fn note_entities(&mut self, kind: EditKind, joins: bool, entities: &[usize]) {
-        let data = &self.scene.data.entities;
-        self.history.note(kind, self.selection, joins, || Snapshot {
-            entities: entities.iter().map(|&i| (i, data[i].clone())).collect(),
-            ..Snapshot::default()
-        });
-    }
-
     fn travel(&mut self, forth: bool) -> Effect {
+        let Some(there) = self.history.travel(forth, &self.scene.data) else {
+            return Effect::said(format!("nothing to {}", if forth { "redo" } else { "undo" }));
+        };
         let mut changed = Changed::default();
         let scene = &mut self.scene;
-        let swap = |snapshot: Snapshot| {
-            let mut back = Snapshot::default();
-            for (index, data) in snapshot.entities {
-                back.entities.push((index, scene.data.entities[index].clone()));
-                let before = scene.entities[index].clone();
-                scene.put_entity(index, data);
-                let after = &scene.entities[index];
-                changed.roles |= (before.emits, before.occludes) != (after.emits, after.occludes);
-                changed.emission |= before.emission != after.emission;
-                changed.placements = true;
+        for (index, data) in there.entities.into_iter().enumerate() {
+            if data == scene.data.entities[index] {
+                continue;
             }
-            if let Some(source) = snapshot.environment {
-                back.environment = Some(scene.data.environment.clone());
-                // The scene had this environment before, with the same picture.
-                changed.sky = scene.set_environment(&source).is_ok();
-            }
-            if let Some(ev) = snapshot.exposure_ev {
-                back.exposure_ev = Some(scene.data.output.exposure_ev());
-                scene.data.output.exposure_ev = Some(ev);
-                changed.exposure = true;
-            }
-            back
-        };
-        let found = self.history.travel(forth, swap);
-        let message = (!found).then(|| format!("nothing to {}", if forth { "redo" } else { "undo" }));
-        Effect { changed, message }
+            let before = scene.entities[index].clone();
+            scene.put_entity(index, data);
+            let after = &scene.entities[index];
+            changed.roles |= (before.emits, before.occludes) != (after.emits, after.occludes);
+            changed.emission |= before.emission != after.emission;
+            changed.placements = true;
+        }
+        if there.environment != scene.data.environment {
+            // The scene had this environment before, with the same picture.
+            changed.sky = scene.set_environment(&there.environment).is_ok();
+        }
+        changed.exposure = there.output.exposure_ev != scene.data.output.exposure_ev;
+        scene.data.output.exposure_ev = there.output.exposure_ev;
+        changed.into()
     }
 }
 

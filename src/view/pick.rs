@@ -1,7 +1,7 @@
 //! Picking and dragging: rays from the picture into the scene.
 
 use super::command::{Changed, Effect};
-use super::edit::{self, EditKind, Snapshot};
+use super::edit::{self, EditKind};
 use super::editor::Editor;
 use crate::draw::camera::through_pixels;
 use crate::scene::{EntityData, Placement, Scene};
@@ -125,8 +125,7 @@ impl Editor {
         let Some(after) = after else { return Effect::default() };
         let joins = drag.moved;
         drag.moved = true;
-        let before = || Snapshot { entities: drag.before.clone(), ..Snapshot::default() };
-        self.history.note(EditKind::Drag, Some(drag.before[0].0), joins, before);
+        self.history.note(EditKind::Drag, Some(drag.before[0].0), joins, &self.scene.data);
         for ((entity, _), after) in drag.before.iter().zip(after) {
             self.scene.put_entity(*entity, after);
         }

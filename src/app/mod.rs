@@ -4,7 +4,6 @@ mod bake;
 mod bench;
 mod check;
 mod compare;
-mod compiling;
 mod context;
 mod demo;
 mod devices;

@@ -1,8 +1,8 @@
 //! Output of the program: results, logs, errors, progress bars, tables.
 
 use super::Global;
-use super::compiling::CompilingLine;
 use crate::error::{Error, Result, is_deceptive, one_line};
+use crate::gpu::compiling;
 use indicatif::{MultiProgress, ProgressBar, ProgressDrawTarget, ProgressStyle};
 use std::cell::RefCell;
 use std::io::{IsTerminal, Write};
@@ -78,12 +78,11 @@ pub fn start_log(global: &Global) {
     let _ = env_logger::Builder::from_env(environment).format(line).try_init();
 }
 
-/// A progress bar for one piece of work after another, and a line for what is being compiled. Nothing is shown where
+/// A progress bar for one piece of work after another, and a line where shaders are compiled. Nothing is shown where
 /// stderr is no terminal or bars are not wanted.
 pub struct Progress {
     hidden: bool,
     bars: MultiProgress,
-    _compiling: Option<CompilingLine>,
     current: RefCell<Option<(String, ProgressBar)>>,
 }
 
@@ -92,8 +91,14 @@ impl Progress {
     pub fn new(global: &Global) -> Self {
         let hidden = global.no_progress || global.quiet || !std::io::stderr().is_terminal();
         let bars = MultiProgress::with_draw_target(ProgressDrawTarget::stderr());
-        let compiling = (!hidden).then(|| CompilingLine::new(bars.clone()));
-        Progress { hidden, bars, _compiling: compiling, current: RefCell::new(None) }
+        if !hidden {
+            let lines = bars.clone();
+            compiling::tell_first(move |shader| {
+                let line = format!("compiling shaders, {shader} first: this takes longer than with a cache");
+                let _ = lines.println(one_line(&line)); // a line that failed is no reason to fail
+            });
+        }
+        Progress { hidden, bars, current: RefCell::new(None) }
     }
 
     /// Shows that `done` of `all` samples of `what` are baked.

@@ -1,36 +1,18 @@
-//! Compilations in progress. A shader of seven bands takes a minute, so a terminal can show what it
-//! waits for.
+//! Tells of the first shader that is compiled rather than found in the cache: some take seconds, of seven bands a
+//! minute, and a terminal can say what it waits for.
 
-use std::sync::{Mutex, MutexGuard, PoisonError};
-use std::time::Instant;
+use std::sync::{Mutex, PoisonError};
 
-static NOW: Mutex<Vec<(String, Instant)>> = Mutex::new(Vec::new());
+type Tell = Box<dyn FnOnce(&str) + Send>;
 
-fn now() -> MutexGuard<'static, Vec<(String, Instant)>> {
-    NOW.lock().unwrap_or_else(PoisonError::into_inner)
+static TELL: Mutex<Option<Tell>> = Mutex::new(None);
+
+/// Has `tell` told the name of the first shader that is compiled from now on.
+pub fn tell_first(tell: impl FnOnce(&str) + Send + 'static) {
+    *TELL.lock().unwrap_or_else(PoisonError::into_inner) = Some(Box::new(tell));
 }
 
-/// Lists something as being compiled while it lives.
-pub(super) struct Compiling((String, Instant));
-
-impl Compiling {
-    pub(super) fn new(kind: &str, name: &str) -> Self {
-        let entry = (format!("{kind} {name}"), Instant::now());
-        now().push(entry.clone());
-        Compiling(entry)
-    }
-}
-
-impl Drop for Compiling {
-    fn drop(&mut self) {
-        let mut now = now();
-        if let Some(at) = now.iter().position(|entry| *entry == self.0) {
-            now.remove(at);
-        }
-    }
-}
-
-/// The longest compilation in progress, and its start.
-pub fn longest() -> Option<(String, Instant)> {
-    now().iter().min_by_key(|(_, since)| *since).cloned()
+pub(super) fn begins(shader: &str) {
+    let tell = TELL.lock().unwrap_or_else(PoisonError::into_inner).take();
+    tell.into_iter().for_each(|tell| tell(shader));
 }

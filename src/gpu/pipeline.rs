@@ -1,7 +1,6 @@
 //! Pipelines and their layouts, built from the reflection of their shaders.
 
 use super::Checked;
-use super::compiling::Compiling;
 use super::device::Device;
 use super::reflect::{Binding, Reflection, VertexInput};
 use super::shader::{Shader, Stage};
@@ -183,7 +182,6 @@ impl ComputePipeline {
             .module(module.1)
             .name(c"main");
         let create = vk::ComputePipelineCreateInfo::default().stage(stage).layout(layout.pipeline);
-        let _compiling = Compiling::new("pipeline", name);
         // SAFETY: everything that `create` points to outlives the call; destroyed by `PipelineHandle`.
         let handle = unsafe { device.handle.create_compute_pipelines(device.pipeline_cache, &[create], None) }
             .map_err(|(_, code)| code)
@@ -300,7 +298,6 @@ impl GraphicsPipeline {
             .dynamic_state(&dynamic)
             .layout(layout.pipeline)
             .push_next(&mut rendering);
-        let _compiling = Compiling::new("pipeline", name);
         // SAFETY: everything that `create` points to outlives the call; destroyed by `PipelineHandle`.
         let handle = unsafe { device.handle.create_graphics_pipelines(device.pipeline_cache, &[create], None) }
             .map_err(|(_, code)| code)

@@ -1,6 +1,6 @@
 //! GLSL to SPIR-V through shaderc at run time, with an include callback and a cache on disk.
 
-use super::compiling::Compiling;
+use super::compiling;
 use super::reflect::Reflection;
 use crate::error::{Error, Result};
 use std::collections::BTreeMap;
@@ -66,9 +66,8 @@ impl Shader {
         if let Some(found) = cached.and_then(|spirv| shader(spirv).ok()) {
             return Ok(found);
         }
-        let compiling = Compiling::new("shader", source.name);
+        compiling::begins(source.name);
         let spirv = compile(source, &includes)?;
-        drop(compiling);
         if let Some(path) = path
             && let Err(error) = crate::files::replace(&path, &sealed(&key, bytemuck::cast_slice(&spirv)))
         {

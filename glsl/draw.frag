@@ -50,7 +50,7 @@ void main() {
 #if GLOSS
     vec3 base = over_mean * within * tint * gloss_entity_at(push.entity).albedo;
     shown = glow(push.entity, within * shown, push.emission_white.rgb, uv);
-    shown += glossy(push.entity, base, over_mean * within * light, uv, within);
+    shown += glossy(push.entity, base, over_mean * within * light, vertex_shares(within), uv, within);
 #if OVER
     color = vec4(finish(shown, push.emission_white.w), opacity);
 #else

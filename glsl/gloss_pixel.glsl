@@ -57,18 +57,22 @@ vec3 open_light(GlossEntity entity, vec3 n, vec3 ground, vec3 place, vec3 bounce
 }
 #endif
 
-// Radiance of a pixel without emission. `light` is that of a diffuse surface of colour `base`; `within` is that of
-// within_triangle.
-vec3 glossy(uint index, vec3 base, vec3 light, vec2 uv, float within) {
+// Shares of the lights that highlights are of, as vertices have them.
+vec4 vertex_shares(float within) {
+#if HIGHLIGHTS
+    return within * shares;
+#else
+    return vec4(0.0);
+#endif
+}
+
+// Radiance of a pixel without emission. `light` is that of a diffuse surface of colour `base`, `share` of each light that
+// highlights are of how much arrives; `within` is that of within_triangle.
+vec3 glossy(uint index, vec3 base, vec3 light, vec4 share, vec2 uv, float within) {
     GlossEntity entity = gloss_entity_at(index);
     vec3 n = normalize(normal);
     float roughness = entity.roughness, metallic = entity.metallic;
     Reflection found = Reflection(within * first.rgb, within * second);
-#if HIGHLIGHTS
-    vec4 share = within * shares;
-#else
-    vec4 share = vec4(0.0);
-#endif
 #if TEXTURED
     vec4 of_gloss = texture(gloss_picture, uv);
     roughness = clamp(entity.factors.x * of_gloss.g, 0.0, 1.0);

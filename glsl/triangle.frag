@@ -39,6 +39,9 @@ void main() {
 #endif
     vec3 weight = within * weights;
     vec3 light = blend(radiosity, lit, weight);
+#if GLOSS
+    vec4 share = vertex_shares(within);
+#endif
     uint nearest = triangle[weight.x >= max(weight.y, weight.z) ? 0 : weight.y >= weight.z ? 1 : 2];
     uvec2 chain = chain_of(push.cluster_first, nearest);
     bool own_maps = (chain.y & OWN_MAPS) != 0;
@@ -55,11 +58,17 @@ void main() {
             facings[i].counts = !own_maps || triangle[i] / WORKGROUP == nearest / WORKGROUP;
 #endif
         }
+#if GLOSS && HIGHLIGHTS
+        shown_lights = gloss_entity_at(push.receiver).lights;
+#endif
         light = blend(soft, lit, weight) + pixel_light(receiver, within * at, facings, chain);
+#if GLOSS && HIGHLIGHTS
+        share = shown_shares;
+#endif
     }
 #if GLOSS
     vec3 base = reflectance * gloss_entity_at(push.receiver).albedo;
-    light = glossy(push.receiver, base, reflectance * light, uv, within);
+    light = glossy(push.receiver, base, reflectance * light, share, uv, within);
     reflectance = vec3(1.0);
     vec3 glowing = glow(push.receiver, within * push.emission_white.rgb * emission, push.emission_white.rgb, uv);
 #else

@@ -179,7 +179,7 @@ impl DrawGrid {
 
     pub fn row(sharp: Option<&SharpPermutation>) -> ShaderPermutation {
         let row = ShaderPermutation::new("grid.frag", 4).define("PIXEL", sharp.is_some());
-        sharp.map_or(row.clone(), |sharp| sharp.pixel_row(row, false))
+        sharp.map_or(row.clone(), |sharp| sharp.pixel_row(row, false, false))
     }
 
     /// Draws a range of one's indices in the area that was set, lit by the radiosity of all vertices.

@@ -279,7 +279,7 @@ impl DrawTriangles {
         let row = |file| look.macros(ShaderPermutation::new(file, 4), GLOSS_BINDINGS[0]);
         let fragment = row("draw.frag").define("OVER", over).define("SAMPLES", samples);
         let fragment = match look {
-            Look::Glossy { highlights: Some(sharp), .. } => sharp.pixel_row(fragment, false),
+            Look::Glossy { highlights: Some(sharp), .. } => sharp.pixel_row(fragment, false, false),
             _ => fragment,
         };
         [row("draw.vert"), fragment]
@@ -288,9 +288,10 @@ impl DrawTriangles {
     /// The rows of the shaders whose pixels evaluate lights: vertex and fragment.
     pub fn patch_rows(samples: u32, look: Look<'_>, sharp: &SharpPermutation) -> [ShaderPermutation; 2] {
         let row = |file| look.macros(ShaderPermutation::new(file, 4), GLOSS_BINDINGS[1]);
+        let shows = matches!(look, Look::Glossy { highlights: Some(_), .. });
         [
             row("triangle.vert").number("LEAST_PX", LEAST_PX),
-            sharp.pixel_row(row("triangle.frag").define("SAMPLES", samples), sharp.self_shadows),
+            sharp.pixel_row(row("triangle.frag").define("SAMPLES", samples), sharp.self_shadows, shows),
         ]
     }
 

@@ -83,9 +83,10 @@ impl SharpPermutation {
         self.shared(ShaderPermutation::new("sharp.comp", 4)).define("WORKGROUP", CLUSTER_VERTICES)
     }
 
-    /// A fragment shader that evaluates sharp lights. It reads everything through texel views.
-    pub fn pixel_row(&self, row: ShaderPermutation, self_shadows: bool) -> ShaderPermutation {
-        SharpPermutation { reads: Reads::Texels, self_shadows, edges: false, gloss: false, lamps: false, ..*self }
+    /// A fragment shader that evaluates sharp lights. It reads everything through texel views. `gloss` tells whether it
+    /// shows highlights of them.
+    pub fn pixel_row(&self, row: ShaderPermutation, self_shadows: bool, gloss: bool) -> ShaderPermutation {
+        SharpPermutation { reads: Reads::Texels, self_shadows, edges: false, gloss, lamps: false, ..*self }
             .shared(row)
             .define("WORKGROUP", CLUSTER_VERTICES)
     }

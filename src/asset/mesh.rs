@@ -240,11 +240,17 @@ impl Mesh {
         is_ball.then(|| self.area_m2() / (4.0 * std::f64::consts::PI * radius * radius))
     }
 
+    /// Least and largest corner of the box around it.
+    pub fn extent(&self) -> [Vec3; 2] {
+        let places = || self.positions.iter().copied();
+        [places().fold(Vec3::MAX, Vec3::min), places().fold(Vec3::MIN, Vec3::max)]
+    }
+
     /// The tube that the mesh is, if it is convex, long along one of its axes, and at most twice as wide as thick. A body
     /// that is not round counts as the cylinder of its length and area.
     fn tube(&self) -> Option<LampFace> {
-        let places = || self.positions.iter().copied();
-        let size = places().fold(Vec3::MIN, Vec3::max) - places().fold(Vec3::MAX, Vec3::min);
+        let [low, high] = self.extent();
+        let size = high - low;
         let axis = size.max_position();
         let [a, b] = [size[(axis + 1) % 3], size[(axis + 2) % 3]];
         if a.max(b) > 2.0 * a.min(b) || !self.is_convex() {

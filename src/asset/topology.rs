@@ -26,6 +26,9 @@ const FLAT_TOLERANCE: f64 = 1e-5;
 /// files.
 const VERTEX_NOISE: f64 = 5e-7;
 
+/// Steps of a full turn in which sides around an edge are told apart.
+const ANGLE_STEPS: f64 = 4096.0;
+
 /// One side of a triangle: `corner` is 3 * triangle + k, the side runs from that corner to the next one.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) struct HalfEdge {
@@ -129,11 +132,46 @@ fn pieces(edges: &[&[HalfEdge]], triangle_count: usize) -> Sets {
     sets
 }
 
+/// Corners of the sides along an edge that belong together. Where solids touch along it, each has two sides with its
+/// inside between them.
+fn mates(edge: &[HalfEdge], positions: &[Vec3], triangles: &[[u32; 3]]) -> Vec<[u32; 2]> {
+    let forward = edge.iter().filter(|side| !side.reversed).count();
+    if edge.len() < 4 || 2 * forward != edge.len() {
+        return edge.windows(2).map(|pair| [pair[0].corner, pair[1].corner]).collect();
+    }
+    let place = |corner: u32, along: usize| {
+        let triangle = triangles[corner as usize / 3];
+        positions[triangle[(corner as usize + along) % 3] as usize].as_dvec3()
+    };
+    // Sorted sides begin with one that runs from low to high.
+    let [from, to] = [0, 1].map(|along| place(edge[0].corner, along));
+    let axis = (to - from).normalize_or_zero();
+    let across = axis.any_orthonormal_vector();
+    let up = axis.cross(across);
+    // From the outside of a side that runs forward, the angle grows; sides that lie on each other end one solid first.
+    let turned = |side: &HalfEdge| {
+        let to = place(side.corner, 2) - from;
+        let angle = to.dot(up).atan2(to.dot(across)) / std::f64::consts::TAU;
+        ((angle * ANGLE_STEPS).round().rem_euclid(ANGLE_STEPS) as u32, side.reversed)
+    };
+    let mut around: Vec<&HalfEdge> = edge.iter().collect();
+    around.sort_by_key(|side| turned(side));
+    let mate = |(at, side): (usize, &&HalfEdge)| {
+        let mut others = around.iter().cycle().skip(at + 1);
+        let other = others.find(|other| !other.reversed).filter(|_| side.reversed)?;
+        Some([side.corner, other.corner])
+    };
+    around.iter().enumerate().filter_map(mate).collect()
+}
+
 /// The piece that each triangle belongs to; pieces are numbered by their first triangles.
 pub fn piece_numbers(positions: &[Vec3], triangles: &[[u32; 3]]) -> Vec<u32> {
     let sides = sides(&weld(positions, triangles).0);
     let edges: Vec<&[HalfEdge]> = edges(&sides).collect();
-    let mut pieces = pieces(&edges, triangles.len());
+    let mut pieces = Sets::new(triangles.len());
+    for [a, b] in edges.iter().flat_map(|edge| mates(edge, positions, triangles)) {
+        pieces.join(a as usize / 3, b as usize / 3);
+    }
     let mut numbers = HashMap::new();
     let mut number = |triangle: usize| {
         let next = numbers.len() as u32;

@@ -262,8 +262,6 @@ pub struct Bounce {
     means: ComputePipeline,
     bounce: ComputePipeline,
     texels: bool,
-    /// Whether the scene has sharp lights.
-    soft: bool,
     blocks: Buffer,
     block_count: u32,
     areas: Buffer,
@@ -324,7 +322,6 @@ impl Bounce {
             means,
             bounce,
             texels,
-            soft,
             block_count: linked.blocks.len() as u32,
             blocks: Buffer::with_data(device, "runs", &linked.blocks)?,
             areas: Buffer::with_data(device, "areas of vertices", &linked.areas)?,
@@ -336,14 +333,6 @@ impl Bounce {
             vertex_count,
             movers: meets.then(movers).transpose()?,
         })
-    }
-
-    /// Compiles the shaders anew.
-    pub fn rebuild(&mut self, device: &Arc<Device>, library: &Library) -> Result<()> {
-        let own = pipelines(device, library, self.texels, self.soft, self.movers.is_some())?;
-        self.movers.as_mut().map_or(Ok(()), |movers| movers.rebuild(device, library))?;
-        [self.means, self.bounce] = own;
-        Ok(())
     }
 
     /// Finds how many steps surfaces of these albedos need.

@@ -127,8 +127,6 @@ pub(super) struct Movers {
     distant: ComputePipeline,
     movers: ComputePipeline,
     permutation: MergePermutation,
-    /// Whether any mesh shadows itself.
-    self_shadows: bool,
     pub surfaces: Surfaces,
     pub far: FarRuns,
     far_data: Buffer,
@@ -185,7 +183,6 @@ impl Movers {
             outgoing,
             distant,
             movers,
-            self_shadows,
             far_data: buffer("far runs", &far_data)?,
             movers_data: Upload::new(device, "movers", size_of_val(&surfaces.movers[..]).max(32) as u64)?,
             runs: buffer("runs of movers", bytemuck::cast_slice(&surfaces.runs))?,
@@ -201,11 +198,6 @@ impl Movers {
             surfaces,
             far,
         })
-    }
-
-    pub fn rebuild(&mut self, device: &Arc<Device>, library: &Library) -> Result<()> {
-        [self.outgoing, self.distant, self.movers] = pipelines(device, library, &self.permutation, self.self_shadows)?;
-        Ok(())
     }
 
     /// Lists what each cluster meets at the lists' time.

@@ -110,11 +110,9 @@ impl Frame {
 
     /// How far a point is from the box around an entity: what of two panes lies in front is nearer, however large.
     fn box_distance_m(&self, mesh: usize, placement: &Placement, point: DVec3) -> f64 {
-        let positions = &self.scene.meshes[mesh].positions;
-        let (low, high) = positions.iter().fold((Vec3::MAX, Vec3::MIN), |(l, h), p| (l.min(*p), h.max(*p)));
-        let scale = f64::from(placement.scale);
-        let own = placement.turn().inverse() * (point - placement.position.as_dvec3()) / scale;
-        scale * own.distance(own.clamp(low.as_dvec3(), high.as_dvec3()))
+        let [low, high] = self.scene.meshes[mesh].extent();
+        let own = placement.local(point);
+        f64::from(placement.scale) * own.distance(own.clamp(low.as_dvec3(), high.as_dvec3()))
     }
 
     /// What varies the reflectance of an entity. Its vertices are lit by the mean.

@@ -30,6 +30,11 @@ impl Placement {
         self.position.as_dvec3() + self.turn() * (object * f64::from(self.scale))
     }
 
+    /// Where a point of the world is in the object.
+    pub fn local(&self, world: DVec3) -> DVec3 {
+        self.turn().inverse() * (world - self.position.as_dvec3()) / f64::from(self.scale)
+    }
+
     /// Centre and radius in the world of a sphere of the object, metres.
     pub fn sphere(&self, (centre, radius_m): (Vec3, f32)) -> (DVec3, f64) {
         (self.point(centre.as_dvec3()), f64::from(radius_m) * f64::from(self.scale))

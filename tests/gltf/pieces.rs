@@ -36,6 +36,28 @@ fn loose_pieces_become_entities() {
     }
 }
 
+/// Boxes that share a face, an edge or a corner are pieces, whether the face is there twice or lies within.
+#[test]
+fn boxes_that_touch_are_pieces() {
+    let cube = shadow_fields::asset::generate::cuboid(Vec3::ONE, 1);
+    let places = [Vec3::ZERO, Vec3::X, Vec3::new(2.0, 1.0, 0.0), Vec3::new(3.0, 2.0, 1.0)];
+    let mut model = Model::default();
+    let corners: Vec<f32> =
+        places.iter().flat_map(|place| cube.positions.iter().flat_map(|p| (*p + *place).to_array())).collect();
+    let count = cube.positions.len() as u16;
+    let triangles = || cube.triangles.iter().flatten().map(|v| *v as u16);
+    let indices: Vec<u16> = (0..4).flat_map(|box_| triangles().map(move |v| v + box_ * count)).collect();
+    let positions = model.positions(&corners);
+    let indices = model.indices(&indices);
+    let mesh = model.mesh(json!({ "POSITION": positions }), Some(indices), None);
+    model.node(json!({ "mesh": mesh, "name": "boxes" }));
+    let (_, scene) = load(&model);
+    let boxes = scene.entities.iter().filter(|entity| entity.name.starts_with("boxes"));
+    let meshes: Vec<_> = boxes.map(|entity| &scene.meshes[entity.mesh]).collect();
+    assert_eq!(meshes.len(), 4);
+    assert!(meshes.iter().all(|mesh| mesh.triangles.len() == 12 && mesh.is_convex()));
+}
+
 #[test]
 fn lamps_and_what_lets_light_through_stay_whole() {
     let glass = json!({ "alphaMode": "BLEND", "pbrMetallicRoughness": { "baseColorFactor": [1, 1, 1, 0.3] } });

@@ -106,3 +106,65 @@ fn no_light_comes_through_a_lamp_shade() {
     let error = picture_error(&stage, &scene.build().unwrap());
     assert!(error < 0.03, "{error}");
 }
+
+/// A wall with a window cut out of it, in one piece: twelve quads from front to back, and the faces within.
+fn wall_with_window() -> Mesh {
+    // Outer and inner corners, around.
+    let outer = [[-1.5, 0.0], [1.5, 0.0], [1.5, 1.6], [-1.5, 1.6]];
+    let inner = [[-0.4, 0.6], [0.6, 0.6], [0.6, 1.2], [-0.4, 1.2]];
+    let place = |[x, y]: [f32; 2], z: f32| Vec3::new(x, y, z);
+    let mut corners = Vec::new();
+    for i in 0..4 {
+        let next = (i + 1) % 4;
+        let (a, b, c, d) = (outer[i], outer[next], inner[next], inner[i]);
+        corners.extend([place(a, 0.05), place(b, 0.05), place(c, 0.05), place(d, 0.05)]);
+        corners.extend([place(b, -0.05), place(a, -0.05), place(d, -0.05), place(c, -0.05)]);
+        corners.extend([place(b, 0.05), place(a, 0.05), place(a, -0.05), place(b, -0.05)]);
+        corners.extend([place(d, 0.05), place(c, 0.05), place(c, -0.05), place(d, -0.05)]);
+    }
+    let quads = 0..corners.len() as u32 / 4;
+    let triangles = quads.flat_map(|i| [[4 * i, 4 * i + 1, 4 * i + 2], [4 * i, 4 * i + 2, 4 * i + 3]]).collect();
+    Mesh::new("wall", corners, Vec::new(), None, triangles).unwrap()
+}
+
+/// Sunlight falls through a window onto a glossy floor of two triangles: its patch and the highlight within have the
+/// edges that rays find.
+#[test]
+fn a_window_casts_a_patch_of_sunlight_and_its_highlight() {
+    let Some(stage) = stage() else { return };
+    let gloss = Some(toml::from_str("roughness = 0.4").unwrap());
+    for gloss in [None, gloss] {
+        let sky = r#"sun = { toward = [0.3, 0.8, -0.9], angle_deg = 2, radiance = [900, 900, 900] }"#;
+        let scene = Scene::builder()
+            .camera(Camera::new([0.0, 1.6, 3.4], [0.0, 0.3, 0.0]))
+            .environment(toml::from_str(sky).unwrap())
+            .mesh("wall", wall_with_window())
+            .mesh("floor", generate::cuboid(Vec3::new(4.0, 0.1, 4.0), 1))
+            .entity(EntityData { position: Vec3::new(0.0, -0.05, 0.0), gloss, ..EntityData::of_mesh("floor") })
+            .entity(EntityData::of_mesh("wall"));
+        let error = picture_error(&stage, &scene.build().unwrap());
+        assert!(error < 0.11, "{error}");
+    }
+}
+
+/// A lamp in a thin box hangs right below a slab: nothing of its light gets above that.
+#[test]
+fn no_light_comes_through_the_slab_above_a_lamp() {
+    let Some(stage) = stage() else { return };
+    let slab =
+        |position: Vec3, rotation: RotationData| EntityData { position, rotation, ..EntityData::of_mesh("slab") };
+    let scene = Scene::builder()
+        .camera(Camera::new([0.2, 2.4, 3.2], [0.0, 0.8, 0.0]))
+        .mesh("slab", generate::cuboid(Vec3::new(2.4, 0.1, 2.4), 1))
+        .mesh("lamp", generate::cuboid(Vec3::new(0.6, 0.03, 0.6), 1))
+        .entity(slab(Vec3::new(0.0, -0.05, 0.0), RotationData::default()))
+        .entity(slab(Vec3::new(0.0, 1.2, 0.0), RotationData::default()))
+        .entity(slab(Vec3::new(0.0, 1.1, -1.2), turned(Vec3::X, 90.0)))
+        .entity(EntityData {
+            position: Vec3::new(0.0, 1.08, 0.0),
+            emission: Vec3::splat(3.0),
+            ..EntityData::of_mesh("lamp")
+        });
+    let error = picture_error(&stage, &scene.build().unwrap());
+    assert!(error < 0.06, "{error}");
+}

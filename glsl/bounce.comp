@@ -52,6 +52,8 @@ void main() {
         vec4 before = push.first != 0 ? direct : radiosity[i];
         bounced.rgb += push.gain * (direct + bounced - before).rgb;
     }
+    // No light is negative at the end.
+    bounced = push.last != 0 ? max(bounced, vec4(0.0)) : bounced;
     radiosity[i] = direct + bounced;
 #if SOFT
     if (push.last != 0) {

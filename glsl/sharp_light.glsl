@@ -183,7 +183,8 @@ vec4 let_through(Entity occluder, Surface surface, SeenLight light, Block block,
         outlines(rays, cell, weights, side, distance, away);
         EACH for (uint k = 0; k < 4; k++) {
             blocks[k] = share_blocked(distance[k], away[k], tangent[k]);
-            stands[k] = counts_between(away[k], limit[k], in_box[k]);
+            float deeper = side == WHOLE ? 0.0 : side == FAR ? HALF_DEPTH : -HALF_DEPTH;
+            stands[k] = counts_between(away[k], limit[k] - deeper, in_box[k]);
 #if EDGES
             if (before && (side == WHOLE || inside[k] > 0.0)) {
                 float penumbra = max(away[k], NEAREST) * max(tangent[k], LEAST_PENUMBRA);

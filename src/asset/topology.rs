@@ -156,6 +156,11 @@ fn mates(edge: &[HalfEdge], positions: &[Vec3], triangles: &[[u32; 3]]) -> Vec<[
     };
     let mut around: Vec<&HalfEdge> = edge.iter().collect();
     around.sort_by_key(|side| turned(side));
+    // Faces that are there from both sides bound nothing.
+    let both = |at: &[&HalfEdge]| 2 * at.iter().filter(|side| side.reversed).count() == at.len();
+    if around.chunk_by(|a, b| turned(a).0 == turned(b).0).all(both) {
+        return edge.windows(2).map(|pair| [pair[0].corner, pair[1].corner]).collect();
+    }
     let mate = |(at, side): (usize, &&HalfEdge)| {
         let mut others = around.iter().cycle().skip(at + 1);
         let other = others.find(|other| !other.reversed).filter(|_| side.reversed)?;

@@ -518,7 +518,9 @@ impl GroupSpace<'_> {
                 let depth = (local - low).min(high - local).min_element() * f64::from(of.placement.scale);
                 depth > WITHIN * reach * group.radius_m
             };
-            let is_close = |place: &DVec3| place.distance(middle) < FAR * reach && is_within(place);
+            // Those with holes have no outline that is as good.
+            let is_close =
+                |place: &DVec3| place.distance(middle) < FAR * reach && (of.mask.is_some() || is_within(place));
             let comes_near = || places.iter().any(is_close);
             *member == self.member || (of.occludes && !keeps_outline && comes_near())
         };

@@ -3,10 +3,10 @@
 //! A vertex has links to runs of neighbouring vertices that it sees ([`crate::bake::links`]); a run has the mean light
 //! that leaves its vertices. The two passes alternate, once a bounce: means of all runs, and for every vertex its direct
 //! light and albedo times the light along its links. That is Jacobi's iteration of the radiosity equation: each step adds
-//! a bounce. Each adds more than its change, so that few steps bring all bounces ([`relaxation`]).
+//! a bounce. Each goes further than the light has changed, by a factor of its own, so that few bring all ([`relaxation`]).
 //!
-//! Between groups light goes by [`movers`], in the last two steps, as it needs the light that those before bring. Only
-//! fronts reflect. A lamp in
+//! Between groups light goes by [`movers`], in the last steps, as it needs the light that those before bring. Only fronts
+//! reflect. A lamp in
 //! spherical harmonics inside a closed mesh lights nothing of it, as the mesh's transfer ends where its own far side
 //! blocks; a sharp one does.
 
@@ -195,8 +195,8 @@ impl Steps {
         Steps { gains: gains.map(|gain| gain.as_vec3().to_array()).collect(), alone: all.steps as u32 }
     }
 
-    /// All bounces: first those that bring the light that goes between groups, and then `count` in all or more. The last
-    /// adds nothing: of light that a surface has from other groups alone, it leaves all as it is.
+    /// All bounces: first within groups, then between them too, at least two and `count` in all. The last adds nothing,
+    /// so that light which a surface has from other groups alone stays as it is.
     fn between(alone: &Relaxation, count: usize) -> Self {
         let met = count.saturating_sub(alone.steps + 1).max(1);
         let gains = alone.gains(alone.steps).into_iter().chain(alone.gains(met)).chain([DVec3::ZERO]);
@@ -366,7 +366,7 @@ impl Bounce {
         self.movers.as_ref().map(Movers::permutation)
     }
 
-    /// Adds bounces, one a step, to the direct light of all vertices, which was written before.
+    /// Adds bounces, step by step, to the direct light of all vertices, which was written before.
     pub fn record<'r>(&'r self, commands: &mut Commands<'r>, work: &BounceWork<'r>) -> Result<()> {
         let BounceWork { entities, light, steps, .. } = work;
         let quads = vk::Format::R32G32B32A32_SFLOAT;

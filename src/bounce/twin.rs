@@ -57,7 +57,10 @@ impl Bounce {
                 let albedo = DVec3::from(input.objects[entity].albedo_over_pi);
                 let bounced = PI * albedo * (host.along(first, count, &of_runs) * (1.0 - taken) + met);
                 let found = input.direct[place] + bounced;
-                found + gain * (found - light[place])
+                let further = bounced + gain * (found - light[place]);
+                // No light is negative at the end.
+                let least = if step + 1 == steps.count() { DVec3::ZERO } else { DVec3::MIN };
+                input.direct[place] + further.max(least)
             };
             light = host.vertices().enumerate().map(bounced).collect();
         }
@@ -89,16 +92,22 @@ pub(super) struct HostLinks {
 impl HostLinks {
     /// Mean light of every run.
     pub fn means(&self, light: &[DVec3]) -> Vec<DVec3> {
-        let mut means = vec![DVec3::ZERO; self.run_count];
-        for block in &self.blocks {
-            let places: Vec<usize> = (block.vertex_first as usize..).take(block.vertex_count as usize).collect();
+        let of_block = |block: &RunBlock| {
+            let mut means = Vec::new();
+            let places = block.vertex_first as usize..(block.vertex_first + block.vertex_count) as usize;
             for (first, size) in block.runs.into_iter().zip(RUNS) {
-                for (mean, places) in means[first as usize..].iter_mut().zip(places.chunks(size)) {
-                    let whole: f64 = places.iter().map(|&v| f64::from(self.areas[v])).sum();
-                    *mean = places.iter().map(|&v| light[v] * (f64::from(self.areas[v]) / whole.max(1e-30))).sum();
+                for (run, start) in (first as usize..).zip(places.clone().step_by(size)) {
+                    let places = start..(start + size).min(places.end);
+                    let whole: f64 = places.clone().map(|v| f64::from(self.areas[v])).sum();
+                    let mean = places.map(|v| light[v] * (f64::from(self.areas[v]) / whole.max(1e-30))).sum();
+                    means.push((run, mean));
                 }
             }
-        }
+            means
+        };
+        let found: Vec<Vec<(usize, DVec3)>> = self.blocks.par_iter().map(of_block).collect();
+        let mut means = vec![DVec3::ZERO; self.run_count];
+        found.into_iter().flatten().for_each(|(run, mean)| means[run] = mean);
         means
     }
 

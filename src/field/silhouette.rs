@@ -42,6 +42,10 @@ pub const INSIDE: [f64; 2] = [0.9, 1.05];
 /// r, up to which only the whole counts, and from which halves do. Nearer to the rim almost all of the object lies
 /// between the two.
 pub const DEEP: [f64; 2] = [-0.6, -0.2];
+/// How far behind the cut the middle of the far half lies, and that of the near one before it, in r: a light must lie
+/// behind that for the half to count. The outline of a half that is cut there tells of the cut: a bulb right before it
+/// shone through the dome around it, and one right behind was hidden by the dome's top, as seen from below.
+pub const HALF_DEPTH: f64 = 0.2;
 /// Coordinate in r from which on a convex object reaches so far toward its bounding sphere that a box tells nothing
 /// more.
 pub const ROUND: f64 = 0.9;
@@ -338,7 +342,12 @@ impl SilhouetteField {
             let outline = self.outline(near, side, direction);
             let away = outline.depth - along;
             let share = blocked_share(outline.distance / (away.max(NEAREST) * tangent).max(LEAST_PENUMBRA));
-            (share, counts_between(away, distance, in_box))
+            let deeper = match side {
+                Side::Whole => 0.0,
+                Side::Far => HALF_DEPTH,
+                Side::Near => -HALF_DEPTH,
+            };
+            (share, counts_between(away, distance - deeper, in_box))
         };
         let (whole, counts) = by(Side::Whole);
         let nearest = near.point.length().min((near.point + distance.min(1e30) * direction).length());

@@ -65,7 +65,7 @@ fn methods(scene: &Scene, lights: Lights) -> Vec<LightMethod> {
     (0..scene.entities.len()).map(|entity| LightMethod::of(scene, entity, lights)).collect()
 }
 
-/// Largest albedo of each entity, of any colour.
+/// Albedo of each entity.
 fn albedos(scene: &Scene) -> Vec<Vec3> {
     scene.entities.iter().map(|entity| entity.albedo).collect()
 }
@@ -141,7 +141,7 @@ impl Frame {
         if sharp.is_some() {
             radiosity.keep_soft()?;
         }
-        let threads = if device.info.is_software() { gpu::cores() } else { 1 };
+        let threads = if device.info.is_software() { gpu::driver_threads() } else { 1 };
         let mut lists = ClusterLists::new(threads);
         for (index, _) in scene.entities.iter().enumerate().filter(|(_, entity)| entity.receives) {
             lists.add(

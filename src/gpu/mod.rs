@@ -40,7 +40,7 @@ pub use flight::{FLIGHTS, Flight, Timing};
 pub use image::{Image, ImageShape};
 pub use memory::{Buffer, BufferKind, TexelView, Upload};
 pub use pipeline::{ComputePipeline, GraphicsPipeline, GraphicsState, Keeps};
-pub use process::{cores, share_cores};
+pub use process::{cores, driver_threads, share_cores};
 pub use shader::{Shader, Stage};
 pub use share::Gpu;
 pub use texture::Texture;

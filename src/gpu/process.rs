@@ -71,6 +71,12 @@ pub fn cores() -> usize {
     std::thread::available_parallelism().map_or(1, |cores| cores.get())
 }
 
+/// Threads of llvmpipe: as many as the environment says, or cores.
+pub fn driver_threads() -> usize {
+    let given = std::env::var("LP_NUM_THREADS").ok().and_then(|threads| threads.parse().ok());
+    given.unwrap_or_else(cores).max(1)
+}
+
 /// Gives a new process, one of so many at a time, its share of the cores as threads of llvmpipe besides the one that
 /// asks for a drawing, unless the environment says how many. Where every core has a process, none: with a thread
 /// besides, two processes on two cores took 11.1 s for what they did in 10.3 s without.

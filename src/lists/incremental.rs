@@ -77,6 +77,10 @@ pub(crate) struct ClusterLists {
 /// Words before the runs of a list of [`ClusterLists::reflectors`].
 pub(crate) const CUT_HEADER: usize = 7;
 
+/// Most pairs of a cluster and a mover that it sees from afar: 40 MB for each frame in flight, and a dispatch that every
+/// device takes.
+const MOST_PAIRS: usize = 1 << 20;
+
 /// From which entities light bounces onto those of other groups.
 pub(crate) struct Reflectors<'r, I> {
     pub movers: I,
@@ -309,8 +313,8 @@ impl ClusterLists {
     /// Clusters in such an order that each of the device's threads gets its share of every entity's: in the order of
     /// entities one thread lit the floor and was done in half the time that the others took for what stands on it.
     fn deal<T: Copy>(&self, clusters: Vec<T>) -> Vec<T> {
-        let threads = 0..self.threads;
-        threads.flat_map(|thread| clusters.iter().skip(thread).step_by(self.threads)).copied().collect()
+        let count = self.threads.max(1);
+        (0..count).flat_map(|thread| clusters.iter().skip(thread).step_by(count)).copied().collect()
     }
 
     /// What light bounces from onto each cluster at the last update's time. A list begins with [`CUT_HEADER`] words: the
@@ -356,10 +360,13 @@ impl ClusterLists {
         for (number, sighted) in self.deal(found).into_iter().enumerate() {
             let Sighted { middle, cut, near, distant } = sighted;
             let entry_first = all.entries.len() as u32;
+            // Where there are too many pairs, vertices look up the rest.
+            let seen = distant.len().min(MOST_PAIRS - all.pairs.len());
+            let (distant, rest) = distant.split_at(seen);
             let counts = [cut.near.len(), cut.far.len(), all.pairs.len(), distant.len()].map(|count| count as u32);
             all.entries.extend(middle.to_array().map(f32::to_bits));
             all.entries.extend(counts);
-            all.entries.extend(cut.near.iter().chain(&cut.far).chain(near));
+            all.entries.extend(cut.near.iter().chain(&cut.far).chain(near).chain(rest));
             all.pairs.extend(distant.iter().map(|packed| [number as u32, *packed]));
             let entry_count = all.entries.len() as u32 - entry_first;
             all.clusters[number] = layout::Cluster { entry_first, entry_count, ..all.clusters[number] };

@@ -13,7 +13,9 @@ use crate::error::Result;
 use crate::field::lamp_colors::{SHELL_STEP, SHELLS};
 use crate::field::lattice::CELL_WARP;
 use crate::field::sheet::{BEYOND as BEYOND_SHEET, CONTACT};
-use crate::field::silhouette::{DEEP, INSIDE, LEAST_PENUMBRA, LEAST_STEP, NEAREST, NO_BOX, REACH, TOUCHING};
+use crate::field::silhouette::{
+    DEEP, HALF_DEPTH, INSIDE, LEAST_PENUMBRA, LEAST_STEP, NEAREST, NO_BOX, REACH, TOUCHING,
+};
 use crate::field::silhouette_nodes::{BEYOND, EASED, LEAST_AHEAD};
 use crate::field::sub_light::{BLEND, CORNER, LIMIT_SINE, MOST_SINE, NEAR_LIGHT_STEPS, STRIP, THIN, TURNED_BY};
 use crate::gpu::{Bind, Buffer, Commands, ComputePipeline, Device, TexelView};
@@ -123,6 +125,7 @@ impl SharpPermutation {
             ("LEAST_PENUMBRA", LEAST_PENUMBRA),
             ("INSIDE_FROM", INSIDE[0]),
             ("INSIDE_TO", INSIDE[1]),
+            ("HALF_DEPTH", HALF_DEPTH),
             ("DEEP_FROM", DEEP[0]),
             ("DEEP_TO", DEEP[1]),
             ("CONTACT", CONTACT),

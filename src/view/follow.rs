@@ -210,7 +210,8 @@ impl Viewer {
     fn try_reload(&mut self) -> Result<()> {
         let show = Show::new(&self.setup.device, &self.setup.library, self.setup.format)?;
         self.overlay.reload(&self.setup.library)?;
-        if self.frame.is_some() {
+        // Beside a bake the frame that follows it compiles them.
+        if self.frame.is_some() && self.bake.is_none() {
             let mut frame = self.new_frame()?;
             frame.make_pipelines()?;
             self.take(frame);

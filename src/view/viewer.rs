@@ -24,7 +24,7 @@ use crate::shaders::Library;
 use crate::truth::exposure;
 use ash::vk;
 use std::collections::{HashMap, VecDeque};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
@@ -72,6 +72,14 @@ pub(super) struct Message {
     insists: bool,
 }
 
+/// A way to leave a scene.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) enum Leave {
+    ForGood,
+    ForNext,
+    For(PathBuf),
+}
+
 /// An editor with everything that is needed to show it.
 pub struct Viewer {
     pub(super) setup: Setup,
@@ -105,8 +113,8 @@ pub struct Viewer {
     pub(super) timings: VecDeque<Vec<Timing>>,
     pub(super) edges: HashMap<usize, Edges>,
     pub(super) quit: bool,
-    /// Whether it was said that closing or another scene loses edits, since the last edit.
-    pub(super) asked_to_leave: bool,
+    /// Of which way to leave the scene it was said that it loses edits, since the last edit.
+    pub(super) asked_to_leave: Option<Leave>,
     /// Width and height of the window's picture, pixels.
     pub(super) size: [u32; 2],
     /// Time at which the picture is refined, unless anything moves before.
@@ -153,7 +161,7 @@ impl Viewer {
             timings: VecDeque::new(),
             edges: HashMap::new(),
             quit: false,
-            asked_to_leave: false,
+            asked_to_leave: None,
             size: editor.size(),
             refine_at: None,
             pace: Pace::default(),
@@ -279,8 +287,8 @@ impl Viewer {
             other => other,
         };
         match command {
-            Command::NextScene if !self.may_leave() => return Ok(()),
-            Command::Quit => self.quit = self.may_leave(),
+            Command::NextScene if !self.may_leave(Leave::ForNext) => return Ok(()),
+            Command::Quit => self.quit = self.may_leave(Leave::ForGood),
             Command::Save => self.save(),
             Command::Screenshot => {
                 let outcome = self.screenshot();
@@ -290,7 +298,9 @@ impl Viewer {
             _ => {}
         }
         let Effect { mut changed, message } = self.editor.apply(command);
-        self.asked_to_leave &= !(changed.light() || changed.exposure);
+        if changed.light() || changed.exposure {
+            self.asked_to_leave = None;
+        }
         if command == Command::ToggleReference {
             changed |= self.editor.apply(Command::Resize(self.own_size())).changed;
         }
@@ -358,10 +368,10 @@ impl Viewer {
                 return Ok(());
             }
         };
-        if !self.may_leave() {
+        if !self.may_leave(Leave::For(path.to_owned())) {
             return Ok(());
         }
-        self.asked_to_leave = false;
+        self.asked_to_leave = None;
         notes.iter().for_each(|note| self.insist(format!("{}: {note}", path.display())));
         let effect = self.editor.open(scene, path);
         self.insist(format!("opened {}", path.display()));
@@ -384,14 +394,14 @@ impl Viewer {
         Ok((scene, left_out.into_iter().chain(notes.said().iter().cloned()).chain(exposed).collect()))
     }
 
-    /// Whether the scene may go: at the second time if it has edits that are not saved.
-    fn may_leave(&mut self) -> bool {
-        if !self.editor.is_edited() || self.asked_to_leave {
+    /// Whether the scene may go: if it has edits that are not saved, at the second time of the same way.
+    fn may_leave(&mut self, leave: Leave) -> bool {
+        if !self.editor.is_edited() || self.asked_to_leave.as_ref() == Some(&leave) {
             return true;
         }
-        self.asked_to_leave = true;
+        self.asked_to_leave = Some(leave);
         let path = self.editor.path().display();
-        self.insist(format!("unsaved edits of {path}: Ctrl-S saves, the same again goes on without"));
+        self.insist(format!("unsaved edits of {path}: Ctrl-S saves them; do it again to go on without them"));
         false
     }
 

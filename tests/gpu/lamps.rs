@@ -73,20 +73,31 @@ fn a_room_of_one_mesh_is_lit_by_its_ceiling_lamp() {
 #[test]
 fn no_light_comes_through_a_lamp_shade() {
     let Some(stage) = stage() else { return };
-    let profile = [[0.28, -0.15], [0.16, 0.15], [0.15, 0.15], [0.27, -0.15]];
+    // A ring that is open above and below, and a dome with the bulb up to 0.2 radii above the middle of its sphere.
+    let ring = [[0.28, -0.15], [0.16, 0.15], [0.15, 0.15], [0.27, -0.15]];
+    let dome = [[0.28, -0.15], [0.05, 0.15], [0.002, 0.15], [0.002, 0.14], [0.045, 0.14], [0.27, -0.15]];
+    for (profile, height) in [(&ring[..], 0.62), (&dome[..], 0.5), (&dome[..], 0.54), (&dome[..], 0.58)] {
+        let error = picture_error(&stage, &under_a_shade(profile, height));
+        assert!(error < 0.03, "{height}: {error}");
+    }
+}
+
+/// A bulb that high within a shade, which is a profile (radius, height) turned around.
+fn under_a_shade(profile: &[[f32; 2]], height: f32) -> Scene {
     let sides = 24_u32;
+    let count = profile.len() as u32;
     let place = |i: u32| {
-        let [radius, y] = profile[i as usize % 4];
-        let around = radius * Vec2::from_angle(TAU * (i / 4) as f32 / sides as f32);
+        let [radius, y] = profile[(i % count) as usize];
+        let around = radius * Vec2::from_angle(TAU * (i / count) as f32 / sides as f32);
         Vec3::new(around.x, y, around.y)
     };
     let mut corners = Vec::new();
-    for i in 0..4 * sides {
-        let next = i / 4 * 4 + (i + 1) % 4;
-        corners.extend([i, next, next + 4, i + 4].map(|i| place(i % (4 * sides))));
+    for i in 0..count * sides {
+        let next = i / count * count + (i + 1) % count;
+        corners.extend([i, next, next + count, i + count].map(|i| place(i % (count * sides))));
     }
-    let triangles =
-        (0..4 * sides).flat_map(|i| [[4 * i, 4 * i + 1, 4 * i + 2], [4 * i, 4 * i + 2, 4 * i + 3]]).collect();
+    let quads = 0..count * sides;
+    let triangles = quads.flat_map(|i| [[4 * i, 4 * i + 1, 4 * i + 2], [4 * i, 4 * i + 2, 4 * i + 3]]).collect();
     let shade = Mesh::new("shade", corners, Vec::new(), None, triangles).unwrap();
     let slab =
         |position: Vec3, rotation: RotationData| EntityData { position, rotation, ..EntityData::of_mesh("slab") };
@@ -99,12 +110,11 @@ fn no_light_comes_through_a_lamp_shade() {
         .entity(slab(Vec3::new(0.0, 1.9, -1.0), turned(Vec3::X, 90.0)))
         .entity(EntityData { position: Vec3::new(0.0, 0.65, 0.0), ..EntityData::of_mesh("shade") })
         .entity(EntityData {
-            position: Vec3::new(0.0, 0.62, 0.0),
+            position: Vec3::new(0.0, height, 0.0),
             emission: Vec3::splat(150.0),
             ..EntityData::of_mesh("bulb")
         });
-    let error = picture_error(&stage, &scene.build().unwrap());
-    assert!(error < 0.03, "{error}");
+    scene.build().unwrap()
 }
 
 /// A wall with a window cut out of it, in one piece: twelve quads from front to back, and the faces within.

@@ -132,6 +132,28 @@ fn pieces(edges: &[&[HalfEdge]], triangle_count: usize) -> Sets {
     sets
 }
 
+/// The sides of an edge by their angle around it, from any of them on, in [`ANGLE_STEPS`]. From the outside of a side that
+/// runs from low to high the angle grows; of sides that lie on each other, such ones come first.
+fn around<'e>(edge: &'e [HalfEdge], positions: &[Vec3], triangles: &[[u32; 3]]) -> Vec<(u32, &'e HalfEdge)> {
+    let place = |corner: u32, along: usize| {
+        let triangle = triangles[corner as usize / 3];
+        positions[triangle[(corner as usize + along) % 3] as usize].as_dvec3()
+    };
+    // Sorted sides begin with one that runs from low to high, if there is any.
+    let [from, to] = [0, 1].map(|along| place(edge[0].corner, along));
+    let axis = (to - from).normalize_or_zero();
+    let across = axis.any_orthonormal_vector();
+    let up = axis.cross(across);
+    let angle = |side: &HalfEdge| {
+        let to = place(side.corner, 2) - from;
+        let turns = to.dot(up).atan2(to.dot(across)) / std::f64::consts::TAU;
+        (turns * ANGLE_STEPS).round().rem_euclid(ANGLE_STEPS) as u32
+    };
+    let mut around: Vec<(u32, &HalfEdge)> = edge.iter().map(|side| (angle(side), side)).collect();
+    around.sort_by_key(|(angle, side)| (*angle, side.reversed));
+    around
+}
+
 /// Corners of the sides along an edge that belong together. Where solids touch along it, each has two sides with its
 /// inside between them.
 fn mates(edge: &[HalfEdge], positions: &[Vec3], triangles: &[[u32; 3]]) -> Vec<[u32; 2]> {
@@ -139,40 +161,30 @@ fn mates(edge: &[HalfEdge], positions: &[Vec3], triangles: &[[u32; 3]]) -> Vec<[
     if edge.len() < 4 || 2 * forward != edge.len() {
         return edge.windows(2).map(|pair| [pair[0].corner, pair[1].corner]).collect();
     }
-    let place = |corner: u32, along: usize| {
-        let triangle = triangles[corner as usize / 3];
-        positions[triangle[(corner as usize + along) % 3] as usize].as_dvec3()
-    };
-    // Sorted sides begin with one that runs from low to high.
-    let [from, to] = [0, 1].map(|along| place(edge[0].corner, along));
-    let axis = (to - from).normalize_or_zero();
-    let across = axis.any_orthonormal_vector();
-    let up = axis.cross(across);
-    // From the outside of a side that runs forward, the angle grows; sides that lie on each other end one solid first.
-    let turned = |side: &HalfEdge| {
-        let to = place(side.corner, 2) - from;
-        let angle = to.dot(up).atan2(to.dot(across)) / std::f64::consts::TAU;
-        ((angle * ANGLE_STEPS).round().rem_euclid(ANGLE_STEPS) as u32, side.reversed)
-    };
-    let mut around: Vec<&HalfEdge> = edge.iter().collect();
-    around.sort_by_key(|side| turned(side));
-    // Faces that are there from both sides bound nothing.
-    let both = |at: &[&HalfEdge]| 2 * at.iter().filter(|side| side.reversed).count() == at.len();
-    if around.chunk_by(|a, b| turned(a).0 == turned(b).0).all(both) {
-        return edge.windows(2).map(|pair| [pair[0].corner, pair[1].corner]).collect();
-    }
-    let mate = |(at, side): (usize, &&HalfEdge)| {
+    let around = around(edge, positions, triangles);
+    let mate = |(at, (_, side)): (usize, &(u32, &HalfEdge))| {
         let mut others = around.iter().cycle().skip(at + 1);
-        let other = others.find(|other| !other.reversed).filter(|_| side.reversed)?;
+        let (_, other) = others.find(|(_, other)| !other.reversed).filter(|_| side.reversed)?;
         Some([side.corner, other.corner])
     };
     around.iter().enumerate().filter_map(mate).collect()
+}
+
+/// Whether every triangle is there from both sides, so that none bounds anything.
+fn is_doubled(edges: &[&[HalfEdge]], positions: &[Vec3], triangles: &[[u32; 3]]) -> bool {
+    edges.iter().all(|edge| {
+        let around = around(edge, positions, triangles);
+        around.chunk_by(|a, b| a.0 == b.0).all(|at| 2 * at.iter().filter(|(_, side)| side.reversed).count() == at.len())
+    })
 }
 
 /// The piece that each triangle belongs to; pieces are numbered by their first triangles.
 pub fn piece_numbers(positions: &[Vec3], triangles: &[[u32; 3]]) -> Vec<u32> {
     let sides = sides(&weld(positions, triangles).0);
     let edges: Vec<&[HalfEdge]> = edges(&sides).collect();
+    if is_doubled(&edges, positions, triangles) {
+        return vec![0; triangles.len()];
+    }
     let mut pieces = Sets::new(triangles.len());
     for [a, b] in edges.iter().flat_map(|edge| mates(edge, positions, triangles)) {
         pieces.join(a as usize / 3, b as usize / 3);

@@ -46,7 +46,7 @@ fn a_dropped_file_opens() {
     ];
     let mut path = own;
     for next in &files {
-        stand.viewer.apply(Command::SetExposure(0.75)).unwrap();
+        stand.viewer.apply(Command::SetExposure(0.7)).unwrap();
         stand.viewer.open(next).unwrap();
         let line = said(&stand);
         assert!(line.contains("unsaved edits of") && line.contains(&path.display().to_string()), "{line}");
@@ -58,10 +58,10 @@ fn a_dropped_file_opens() {
         path = next.to_owned();
     }
     // Nor does the next scene come, or the window close, over unsaved edits at the first time.
-    stand.viewer.apply(Command::SetExposure(0.75)).unwrap();
+    stand.viewer.apply(Command::SetExposure(0.7)).unwrap();
     stand.viewer.apply(Command::NextScene).unwrap();
     assert_eq!(stand.viewer.editor().path(), path);
-    stand.viewer.apply(Command::SetExposure(0.5)).unwrap();
+    stand.viewer.apply(Command::SetExposure(0.6)).unwrap();
     stand.viewer.apply(Command::Quit).unwrap();
     assert!(!stand.viewer.wants_to_quit(), "a new edit is asked for anew");
     stand.viewer.apply(Command::Quit).unwrap();

@@ -45,7 +45,7 @@ pub const DEEP: [f64; 2] = [-0.6, -0.2];
 /// How far behind the cut the middle of the far half lies, and that of the near one before it, in r: a light must lie
 /// behind that for the half to count. The outline of a half that is cut there tells of the cut: a bulb right before it
 /// shone through the dome around it, and one right behind was hidden by the dome's top, as seen from below.
-pub const HALF_DEPTH: f64 = 0.1;
+pub const HALF_DEPTH: f64 = 0.15;
 /// Coordinate in r from which on a convex object reaches so far toward its bounding sphere that a box tells nothing
 /// more.
 pub const ROUND: f64 = 0.9;

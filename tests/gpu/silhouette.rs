@@ -167,7 +167,8 @@ fn receivers_and_lights_within_the_bounding_sphere_see_what_lies_between_them() 
     // Limits on the root mean square error of a light's blocked share: receivers within, lights within.
     for (mesh, limits) in [
         (generate::torus(0.7, 0.25, 48, 24), [0.045, 0.06]),
-        (generate::teapot(3), [0.03, 0.04]),
+        // Halves count off the cut, for lamps in shades; cut there, lights within a teapot's sphere err 0.040.
+        (generate::teapot(3), [0.03, 0.045]),
         (table(), [0.085, 0.1]),
         (generate::cuboid(Vec3::new(2.0, 0.01, 2.0), 4), [0.06, 0.085]),
         // Its outline is exact; that of a drawn view stays below 0.1.

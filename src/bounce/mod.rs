@@ -3,7 +3,7 @@
 //! A vertex has links to runs of neighbouring vertices that it sees ([`crate::bake::links`]); a run has the mean light
 //! that leaves its vertices. The two passes alternate, once a bounce: means of all runs, and for every vertex its direct
 //! light and albedo times the light along its links. That is Jacobi's iteration of the radiosity equation: each step adds
-//! a bounce. Each goes further than the light has changed, by a factor of its own, so that few bring all ([`relaxation`]).
+//! a bounce. Each goes further than the light has changed, by a factor of its own, so that few bring all (`relaxation`).
 //!
 //! Between groups light goes by [`movers`], in the last steps, as it needs the light that those before bring. Only fronts
 //! reflect. A lamp in

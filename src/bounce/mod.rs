@@ -6,9 +6,8 @@
 //! a bounce. Each goes further than the light has changed, by a factor of its own, so that few bring all (`relaxation`).
 //!
 //! Between groups light goes by [`movers`], in the last steps, as it needs the light that those before bring. Only fronts
-//! reflect. A lamp in
-//! spherical harmonics inside a closed mesh lights nothing of it, as the mesh's transfer ends where its own far side
-//! blocks; a sharp one does.
+//! reflect. A lamp in spherical harmonics inside a closed mesh lights nothing of it, as the mesh's transfer ends where its
+//! own far side blocks; a sharp one does.
 
 pub mod movers;
 mod relaxation;

@@ -1,16 +1,23 @@
 #version 460
+#extension GL_EXT_samplerless_texture_functions : require
 #include "finish.glsl"
 #include "centroid.glsl"
 layout(location = 0) centroid in vec4 radiance; // w: 1
 layout(location = 0) out vec4 color; // alpha: the entity's tag
-#if PAINTED
+#if PAINTED || PIXEL
 layout(location = 1) centroid in vec3 light; // of a surface of the mean reflectance
+#endif
+#if PAINTED
 layout(location = 2) in vec2 uv;
+layout(location = 3) centroid in vec3 tint;
 layout(binding = 0) uniform sampler2D picture;
 #include "holes.glsl"
 #endif
+#if PIXEL
+layout(location = 4) centroid in float edge;
+#include "shown_light.glsl"
+#endif
 #if GLOSS
-layout(location = 3) centroid in vec3 tint;
 #if HIGHLIGHTS
 #include "merge_layout.glsl"
 const uint NONE = 0xffffffffu;
@@ -25,9 +32,7 @@ layout(push_constant) uniform Push {
     mat4 clip_from_object;
     vec4 emission_white; // w = radiance that is shown as white
     float tag; // opacity if OVER
-#if GLOSS
     uint entity;
-#endif
 #if PAINTED
     vec4 paint; // factor on the picture; least alpha
 #endif
@@ -35,7 +40,18 @@ layout(push_constant) uniform Push {
 
 void main() {
     float within = within_triangle(radiance.w);
-    vec3 shown = radiance.rgb;
+    vec3 shown = within * radiance.rgb;
+    float alpha = push.tag;
+    vec4 light_shares = vec4(0.0);
+#if GLOSS
+    light_shares = vertex_shares(within);
+#endif
+#if PAINTED || PIXEL
+    vec3 lit = within * light;
+#endif
+#if PIXEL
+    find_light(push.entity, edge > 0.0, lit, light_shares);
+#endif
 #if PAINTED
     vec4 texel = texture(picture, uv);
     cut_holes(texel.a, push.paint.w);
@@ -45,27 +61,18 @@ void main() {
         discard;
     }
     over_mean *= texel.a;
-    float opacity = push.tag * texel.a;
+    alpha *= texel.a;
 #endif
+    over_mean *= within * tint;
 #if GLOSS
-    vec3 base = over_mean * within * tint * gloss_entity_at(push.entity).albedo;
-    shown = glow(push.entity, within * shown, push.emission_white.rgb, uv);
-    shown += glossy(push.entity, base, over_mean * within * light, vertex_shares(within), uv, within);
-#if OVER
-    color = vec4(finish(shown, push.emission_white.w), opacity);
+    vec3 base = over_mean * gloss_entity_at(push.entity).albedo;
+    shown = glow(push.entity, shown, push.emission_white.rgb, uv);
+    shown += glossy(push.entity, base, over_mean * lit, light_shares, uv, within);
 #else
-    color = vec4(finish(shown, push.emission_white.w), push.tag);
+    shown += over_mean * lit;
 #endif
-    return;
-#else
-    shown += over_mean * light;
+#elif PIXEL
+    shown += lit;
 #endif
-#endif
-#if !OVER
-    color = vec4(finish(within * shown, push.emission_white.w), push.tag);
-#elif PAINTED
-    color = vec4(finish(within * shown, push.emission_white.w), opacity);
-#else
-    color = vec4(finish(within * shown, push.emission_white.w), push.tag);
-#endif
+    color = vec4(finish(shown, push.emission_white.w), alpha);
 }

@@ -1,5 +1,6 @@
 // Light of sharp lights on a pixel. The shader that includes this defines FACINGS, the number of vertices whose weighed
-// light the pixel has. It binds corners of cells or triangles at 0, and the radiosity of every vertex at 1.
+// light the pixel has. It binds corners of cells or triangles at 0, and the radiosity of every vertex at 1, and its push
+// constants have the receiver.
 #include "merge_layout.glsl"
 const uint NONE = 0xffffffffu;
 #define ENTITY_BINDING 2
@@ -21,9 +22,13 @@ uvec2 self_cell(uint i) {
 #endif
 #define STATES 1
 #include "sharp_light.glsl"
+#if SHOWN
+layout(binding = 9) uniform utextureBuffer shown_lights_of; // of every entity
+#endif
+#include "screen_light.glsl"
 
 // What the vertices of a pixel's triangle say of shadows: returns whether an edge is near, and keeps the rest.
-bool has_edge(uvec3 corners) {
+bool read_marks(uvec3 corners) {
     uint marks = 0;
     for (uint i = 0; i < 3; i++) {
         marks |= unpack_marks(texelFetch(radiosity, int(corners[i])).w);
@@ -38,12 +43,22 @@ uvec2 chain_of(uint cluster_first, uint v) {
     return texelFetch(chains, int(cluster_first + v / WORKGROUP)).xy;
 }
 
-// `at`: object's frame, metres.
-vec3 pixel_light(Entity receiver, vec3 at, Facing facings[FACINGS], uvec2 chain) {
+// What is kept of a pixel: `soft` light, and that of sharp lights where the chain has any entries. `at`: object's frame, metres.
+uvec4 pixel_light(Entity receiver, vec3 soft, vec3 at, Facing facings[FACINGS], uvec2 chain) {
     Surface surface;
     surface.position = receiver.scale * to_world(receiver, at);
     surface.origin = receiver.centre.xyz;
     surface.inverse_radius = receiver.centre.w;
     surface.facings = facings;
-    return sharp_sum(surface, chain.x, chain.y) * receiver.albedo;
+    surface.step = receiver.scale * max(length(dFdx(at)), length(dFdy(at)));
+    vec3 light = soft;
+#if SHOWN
+    shown_lights = texelFetch(shown_lights_of, int(push.receiver));
+#else
+    const vec4 shown_shares = vec4(0.0);
+#endif
+    if (chain.y > 0) {
+        light += sharp_sum(surface, chain.x, chain.y) * receiver.albedo;
+    }
+    return pack_light(push.receiver, gl_FragCoord.z, light, shown_shares, shows_badly(receiver.albedo, soft));
 }

@@ -51,7 +51,7 @@ void main() {
     surface.facings[0] = facing_of(receiver, vertex_quad(at + 1).xyz, 1.0, cluster.self_first, v);
     vec4 sum = soft_at(cluster.radiosity_first + v);
 #if EDGES
-    float soft = dot(sum.rgb, vec3(1.0)), albedo = dot(receiver.albedo, vec3(1.0));
+    vec3 soft = sum.rgb;
 #endif
 #if SHOWN
     shown_lights = shown_lights_of[cluster.receiver];
@@ -60,8 +60,7 @@ void main() {
         sum.rgb += sharp_sum(surface, cluster.entry_first, cluster.sharp_count) * receiver.albedo;
     }
 #if EDGES
-    bool is_near = EDGE_STEPS * EDGE_STEPS * albedo * missed > albedo * open_light + soft;
-    sum.w = pack_marks(is_near, light_states, near_occluders);
+    sum.w = pack_marks(shows_badly(receiver.albedo, soft), light_states, near_occluders);
 #endif
     radiosity[cluster.radiosity_first + v] = sum;
 #if LAMPS

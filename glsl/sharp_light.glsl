@@ -28,20 +28,30 @@ float lamps = 0.0; // share of the cosine-weighted view that lamps take, which l
 #endif
 
 #if EDGES
-// Vertices carry a shadow's edge badly where its penumbra is narrow against the distance to the next vertex. The error
-// grows with the square of that distance over the penumbra's width, and with the light that the shadow takes away. They
-// carry the light around a lamp badly that is as near as the next vertex.
+// Vertices, and pixels that are evaluated for their neighbours too, carry a shadow's edge badly where its penumbra is
+// narrow against the distance to the next. The error grows with the square of that distance over the penumbra's width,
+// and with the light that the shadow takes away. They carry the light around a lamp badly that is as near as the next.
 float finest;       // distance over width, for the narrowest penumbra of the current light that comes as near as the next vertex, or 0
 float missed = 0.0; // most, over all lights, of the square of `finest` times the light
 float open_light = 0.0; // of all lights, nothing between
 float curved;       // irradiance by the current light, each part's by the square of the step over its distance, of radiance 1
+
+// Whether an edge is near that shows badly between here and the next, on a surface that sends out `soft` light besides.
+bool shows_badly(vec3 albedo, vec3 soft) {
+    float white = dot(albedo, vec3(1.0));
+    return EDGE_STEPS * EDGE_STEPS * white * missed > white * open_light + dot(soft, vec3(1.0));
+}
 #endif
 
 #if EDGES || STATES
 #include "marks.glsl"
-// Of a vertex, or of all vertices of a triangle.
+// With STATES as the vertices of a pixel's triangle tell them, else as this vertex finds them.
 uint light_states = 0;
 uint near_occluders = 0;
+#endif
+
+#if EDGES && !STATES
+#define FINDS_STATES 1
 #endif
 
 // Which way a vertex faces, and what its own mesh leaves of its view.
@@ -64,7 +74,7 @@ struct Surface {
     float inverse_radius; // 1 over the bounding radius of its object, 1/m
     Facing facings[FACINGS];
 #if EDGES
-    float step;    // farthest that a neighbouring vertex is, metres
+    float step;    // farthest that a neighbouring vertex or pixel is, metres
 #endif
 };
 
@@ -357,7 +367,7 @@ bool may_block(uint packed, Surface surface) {
     float sine = min(CONE_WIDER / max(shining.w * distance, 1e-30), MOST_SINE);
     float radius = BALL_WIDER / ball.w;
 #if EDGES
-    radius += surface.step;
+    radius += max(1.0, EDGE_REACH) * surface.step;
 #endif
     float along = dot(to_ball, toward);
     float off = length(to_ball - along * toward);
@@ -434,8 +444,10 @@ vec3 chain_sum(Surface surface, Entity shining, bool open, uint first, uint coun
                     vec4 free = let_through(ENTITY(packed & SKY_CHAIN), surface, light, block, true);
                     share *= free;
 #if EDGES
+#if FINDS_STATES
                     bool matters = finest > 0.0 || free != vec4(1.0);
                     near_occluders |= matters ? occluder_bit(packed & SKY_CHAIN) : 0;
+#endif
                     covered = covered || (finest == 0.0 && free == vec4(0.0));
                     nearest = max(nearest, finest);
 #endif
@@ -453,7 +465,7 @@ vec3 chain_sum(Surface surface, Entity shining, bool open, uint first, uint coun
             do {
                 if (is_kind(packed, ENTRY_SHEET)) {
                     pass_sheet(shadow, ENTITY(packed & SKY_CHAIN), surface, light, block);
-#if EDGES
+#if FINDS_STATES
                     near_occluders |= occluder_bit(packed & SKY_CHAIN);
 #endif
                     j = next_entry(surface, first, count, j + 1, true);
@@ -500,6 +512,8 @@ vec3 chain_sum(Surface surface, Entity shining, bool open, uint first, uint coun
     finest = hidden ? 0.0 : nearest;
     find_rim(ramp, shining, surface.step / max(light.distance, 1e-30));
     add_open(unblocked, cone, shining);
+#endif
+#if FINDS_STATES
     uint state = finest > 0.0 ? CUT : passed >= 0.999 * unblocked ? OPEN : passed <= 0.001 * unblocked ? DARK : CUT;
     light_states |= state << state_bit(chain_light(entry_at(first + j)));
 #endif

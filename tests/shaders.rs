@@ -11,8 +11,9 @@ use shadow_fields::bake::silhouette::{Silhouette, SilhouetteOptions};
 use shadow_fields::bounce::movers::{distant_row, movers_row, outgoing_row};
 use shadow_fields::bounce::{bounce_row, runs_row};
 use shadow_fields::draw::grid::DrawGrid;
+use shadow_fields::draw::pixel_light::{LightImages, Receiver, Way};
 use shadow_fields::draw::smooth::Smooth;
-use shadow_fields::draw::triangles::{Detail, DrawTriangles, Look};
+use shadow_fields::draw::triangles::{Detail, DrawTriangles, Form, Look};
 use shadow_fields::field::{FieldKind, Lattice, Storage};
 use shadow_fields::gloss::gloss_row;
 use shadow_fields::lists::skip::Skip;
@@ -92,7 +93,7 @@ fn drawing() -> Vec<ShaderPermutation> {
         boxes: outlines,
         colors: outlines,
         sheets: outlines,
-        gloss: false,
+        gloss: outlines,
         lamps: false,
         self_shadows: true,
         cones: outlines,
@@ -100,7 +101,7 @@ fn drawing() -> Vec<ShaderPermutation> {
         rolled: outlines,
     });
     let ways = [None, Some(&sharp[0]), Some(&sharp[1])];
-    let grids = ways.map(DrawGrid::row);
+    let grids = [false, true].map(DrawGrid::rows).concat();
     let glossy = ways.into_iter().flat_map(|highlights| {
         [Detail::Rough, Detail::Mirror, Detail::Textured].map(|detail| Look::Glossy { highlights, detail })
     });
@@ -108,18 +109,22 @@ fn drawing() -> Vec<ShaderPermutation> {
     let triangles = looks.iter().flat_map(|&look| {
         // Alone, and of four samples a pixel.
         let of = |samples: u32| {
-            let patches = sharp.iter().flat_map(|sharp| DrawTriangles::patch_rows(samples, look, sharp));
-            let over = [false, true].map(|over| DrawTriangles::rows(samples, look, over));
-            over.into_iter().flatten().chain(patches).collect::<Vec<_>>()
+            [Form::Vertices, Form::Pixels, Form::Over].map(|form| DrawTriangles::rows(samples, look, form)).concat()
         };
         [of(1), of(4)].concat()
+    });
+    let lit = sharp.iter().flat_map(|sharp| {
+        Receiver::ALL.iter().flat_map(|receiver| {
+            [Way::Evaluated, Way::Interpolated].map(|way| LightImages::rows(sharp, *receiver, way)).concat()
+        })
     });
     grids
         .into_iter()
         .chain(triangles)
+        .chain(lit)
         .chain([Smooth::fragment()])
         .chain(
-            ["grid.vert", "overlay.vert", "overlay.frag", "show.vert", "show.frag", "smooth.vert"]
+            ["overlay.vert", "overlay.frag", "show.vert", "show.frag", "smooth.vert"]
                 .map(|file| ShaderPermutation::new(file, 4)),
         )
         .collect()

@@ -231,7 +231,7 @@ impl Capture {
             for DrawnFace { eye, face, slot, ranges } in &drawn.faces {
                 let (forward, right, down) = face_axes(*face);
                 let px = self.face_px;
-                drawing.area(slot % self.columns * px, slot / self.columns * px, px, px);
+                drawing.area([slot % self.columns * px, slot / self.columns * px, px, px]);
                 drawing.push(&Push {
                     eye: eye.extend(NEAR).to_array(),
                     right: right.extend(0.0).to_array(),

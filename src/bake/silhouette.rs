@@ -225,7 +225,7 @@ impl Silhouette {
             for (view, frame) in frames.iter().enumerate() {
                 let view = view as u32;
                 let px = self.view_px;
-                drawing.area(view % self.atlas_columns * px, view / self.atlas_columns * px, px, px);
+                drawing.area([view % self.atlas_columns * px, view / self.atlas_columns * px, px, px]);
                 drawing.push(&ViewPush::new(frame, side));
                 drawing.indexed(0..buffers.index_count);
             }

@@ -5,32 +5,27 @@
 //! longer for many small triangles than for a large one of the same area. The picture is that of the triangles, except
 //! for rounding.
 //!
-//! Blocks of cells, the patches, are drawn again where their pixels evaluate sharp lights themselves. A software
-//! rasteriser runs a fragment shader's branches for all pixels of a block of its own, taken or not. So pixels that
-//! evaluate lights are not told from the others in the fragment shader: patches are drawn over the grid by a shader of
-//! their own, whose vertex shader throws away those that no shadow's edge comes near.
+//! Blocks of cells, the patches, are drawn by pass "pixel light" where a shadow's edge comes near. A software rasteriser
+//! runs a fragment shader's branches for all pixels of a block of its own, taken or not, so a vertex shader throws the
+//! other patches away.
 
 use crate::asset::grid::Grid;
-use crate::draw::pixel_light::{PixelLight, texels};
+use crate::draw::pixel_light::{LIGHT_BINDING, shown_light, texels};
 use crate::draw::{DrawnEntity, DrawnViewport, EntityPush, PipelineMaker, made_once};
 use crate::error::Result;
-use crate::gpu::{Buffer, Device, Drawing, GraphicsPipeline, GraphicsState, TexelView};
+use crate::gpu::{Bind, Buffer, Device, Drawing, GraphicsPipeline, Image, TexelView};
 use crate::layout::{QUAD_FORMAT, UPWARDS};
 use crate::shaders::ShaderPermutation;
-use crate::sharp::SharpPermutation;
 use ash::vk;
 use bytemuck::{Pod, Zeroable};
 use glam::Vec3;
 use std::ops::Range;
 use std::sync::{Arc, OnceLock};
 
-const QUADS: vk::Format = vk::Format::R32G32B32A32_UINT;
-/// How much nearer patches are drawn than the grid that they lie on, in steps of depth: 2e-6 of the distance. Rounding
-/// of two triangles in one plane differs by less.
-const NEARER_STEPS: f32 = 32.0;
+pub(super) const QUADS: vk::Format = vk::Format::R32G32B32A32_UINT;
 
 /// Cells along an edge of a block.
-const BLOCK_CELLS: u32 = 4;
+pub(super) const BLOCK_CELLS: u32 = 4;
 
 /// How far a block reaches over its cells on every side, in cells: corners that lie on a neighbour's edge leave cracks.
 const OVERLAP: f32 = 1.0 / 16.0;
@@ -76,12 +71,12 @@ pub struct DrawnGrid {
     positions: Buffer,
     places: Buffer,
     indices: Buffer,
-    corners: Buffer,
-    cells: [u32; 2],
+    pub(super) corners: Buffer,
+    pub(super) cells: [u32; 2],
     /// [`Patches`]: positions, places and indices.
-    patches: [Buffer; 3],
-    patch_indices: u32,
-    normal: Vec3,
+    pub(super) patches: [Buffer; 3],
+    pub(super) patch_indices: u32,
+    pub(super) normal: Vec3,
     /// Diagonal of a cell at most, metres.
     pub reach_m: f32,
     /// Longest side of a cell, metres.
@@ -134,17 +129,14 @@ impl DrawnGrid {
 #[derive(Clone, Copy, Pod, Zeroable)]
 struct Push {
     entity: EntityPush,
-    first: u32,
     cells: [u32; 2],
-    receiver: u32,
-    cluster_first: u32,
-    spare: [u32; 2],
-    normal: [f32; 4],
+    first: u32,
+    spare: u32,
 }
 
 pub struct DrawGrid {
     maker: PipelineMaker,
-    /// Made where they are first drawn with; the second one's pixels evaluate sharp lights.
+    /// Made where they are first drawn with; the second one looks up the light of pixels.
     made: [OnceLock<GraphicsPipeline>; 2],
 }
 
@@ -153,91 +145,49 @@ impl DrawGrid {
         DrawGrid { maker, made: Default::default() }
     }
 
-    /// Makes what grids are drawn with, on all cores.
-    pub fn make(&self) -> Result<()> {
-        let plain = || self.pipeline(None).map(|_| ());
-        let pixels = || self.maker.sharp.as_ref().map_or(Ok(()), |sharp| self.pipeline(Some(sharp)).map(|_| ()));
-        let (plain, pixels) = rayon::join(plain, pixels);
-        plain.and(pixels)
+    /// Makes what grids are drawn with.
+    pub fn make(&self, by_pixel: bool) -> Result<()> {
+        self.pipeline(by_pixel).map(|_| ())
     }
 
-    fn pipeline(&self, sharp: Option<&SharpPermutation>) -> Result<&GraphicsPipeline> {
-        let state = self.maker.state;
-        let vertex = ShaderPermutation::new("grid.vert", 4);
-        let fragment = Self::row(sharp);
-        made_once(&self.made[usize::from(sharp.is_some())], || match sharp {
-            None => self.maker.make("draw grid", &[vertex, fragment], state),
-            Some(_) => {
-                // Corners of the grid and of its patches each snap by up to half of a step along both axes.
-                let nearer_px = 2.0 * self.maker.device.snap_px() as f32;
-                let nearer = GraphicsState { nearer_steps: NEARER_STEPS, nearer_px, ..state };
-                let vertex = vertex.define("BLOCK_CELLS", BLOCK_CELLS);
-                self.maker.make("draw grid pixels", &[vertex, fragment], nearer)
-            }
+    fn pipeline(&self, by_pixel: bool) -> Result<&GraphicsPipeline> {
+        made_once(&self.made[usize::from(by_pixel)], || {
+            self.maker.make("draw grid", &Self::rows(by_pixel), self.maker.state)
         })
     }
 
-    pub fn row(sharp: Option<&SharpPermutation>) -> ShaderPermutation {
-        let row = ShaderPermutation::new("grid.frag", 4).define("PIXEL", sharp.is_some());
-        sharp.map_or(row.clone(), |sharp| sharp.pixel_row(row, false, false))
+    /// Vertex and fragment shader.
+    pub fn rows(by_pixel: bool) -> [ShaderPermutation; 2] {
+        [
+            ShaderPermutation::new("grid.vert", 4).define("EVALUATED", false).define("BLOCK_CELLS", 0_u32),
+            shown_light(ShaderPermutation::new("grid.frag", 4), by_pixel),
+        ]
     }
 
-    /// Draws a range of one's indices in the area that was set, lit by the radiosity of all vertices.
+    /// Draws a range of one's indices in the area that was set, lit by the radiosity of all vertices, or by the `light`
+    /// of pixels where that has any.
     pub fn record<'r>(
         &'r self,
         drawing: &mut Drawing<'_, 'r>,
         (grid, indices): (&'r DrawnGrid, Range<u32>),
         entity: &DrawnEntity<'r>,
         viewport: &DrawnViewport<'r>,
+        light: Option<&'r Image>,
         white: f32,
     ) -> Result<()> {
-        drawing.bind(self.pipeline(None)?, &[(&grid.positions, 0), (&grid.places, 0)], &grid.indices);
-        drawing.resources(&texels(&Self::own(grid, viewport))?)?;
-        Self::finish(drawing, grid, entity, white, indices);
-        Ok(())
-    }
-
-    /// Draws an entity's patches over the grid. Their pixels evaluate sharp lights themselves.
-    pub fn record_patches<'r>(
-        &'r self,
-        drawing: &mut Drawing<'_, 'r>,
-        grid: &'r DrawnGrid,
-        entity: &DrawnEntity<'r>,
-        viewport: &DrawnViewport<'r>,
-        light: &PixelLight<'r>,
-        white: f32,
-    ) -> Result<()> {
-        let Some(sharp) = &self.maker.sharp else { return Ok(()) };
-        let pipeline = self.pipeline(Some(sharp))?;
-        let [positions, places, indices] = &grid.patches;
-        drawing.bind(pipeline, &[(positions, 0), (places, 0)], indices);
-        drawing.resources(&light.binds(&Self::own(grid, viewport), &[])?)?;
-        Self::finish(drawing, grid, entity, white, 0..grid.patch_indices);
-        Ok(())
-    }
-
-    /// Bindings of both fragment shaders.
-    fn own<'r>(grid: &'r DrawnGrid, viewport: &DrawnViewport<'r>) -> [(&'r Buffer, vk::Format); 2] {
-        [(&grid.corners, QUADS), (viewport.radiosity, QUAD_FORMAT)]
-    }
-
-    fn finish(
-        drawing: &mut Drawing<'_, '_>,
-        grid: &DrawnGrid,
-        entity: &DrawnEntity<'_>,
-        white: f32,
-        indices: Range<u32>,
-    ) {
+        drawing.bind(self.pipeline(light.is_some())?, &[(&grid.positions, 0), (&grid.places, 0)], &grid.indices);
+        let mut binds = texels(&[(&grid.corners, QUADS), (viewport.radiosity, QUAD_FORMAT)])?;
+        binds.resize(LIGHT_BINDING as usize, Bind::None);
+        binds.extend(light.map(Bind::Image));
+        drawing.resources(&binds)?;
         drawing.push(&Push {
             entity: EntityPush::new(entity, white),
-            first: (entity.radiosity_offset / 16) as u32,
             cells: grid.cells,
-            receiver: entity.index,
-            cluster_first: entity.by_pixel.map_or(0, |by_pixel| by_pixel.cluster_first),
-            spare: [0; 2],
-            normal: grid.normal.extend(0.0).to_array(),
+            first: (entity.radiosity_offset / 16) as u32,
+            spare: 0,
         });
         drawing.indexed(indices);
+        Ok(())
     }
 }
 

@@ -15,9 +15,9 @@ pub mod triangles;
 use crate::asset::grid::Grid;
 use crate::asset::mesh::Mesh;
 use crate::draw::grid::{DrawGrid, DrawnGrid};
-use crate::draw::pixel_light::{ByPixel, PixelLight};
+use crate::draw::pixel_light::{ByPixel, LightImages, PixelLight, Receiver};
 use crate::draw::smooth::Smooth;
-use crate::draw::triangles::{Detail, DrawTriangles, DrawnSurface, DrawnTriangles};
+use crate::draw::triangles::{Detail, DrawTriangles, DrawnLayer, DrawnSurface, DrawnTriangles};
 use crate::error::Result;
 use crate::gloss::DrawnReflections;
 use crate::gpu::{
@@ -79,7 +79,7 @@ pub enum Shading {
 
 impl Shading {
     /// Default of the shading: pixels where they have several samples, as on a GPU and in files, else vertices. A
-    /// pixel that evaluates lights takes about 1 us of a core on llvmpipe, so frames full of shadow edges take up to 10
+    /// pixel that evaluates lights takes about 2 us of a core on llvmpipe, so frames full of shadow edges take up to 4
     /// times as long as with vertices.
     pub fn usual(antialias: Antialias) -> Self {
         if antialias == Antialias::Samples { Shading::Pixel } else { Shading::Vertex }
@@ -186,6 +186,7 @@ struct EntityPush {
     clip_from_object: [f32; 16],
     emission_white: [f32; 4],
     tag: f32,
+    index: u32,
 }
 
 impl EntityPush {
@@ -194,8 +195,13 @@ impl EntityPush {
             clip_from_object: entity.clip_from_object.to_cols_array(),
             emission_white: entity.emission.extend(white).to_array(),
             tag: entity.tag,
+            index: entity.index,
         }
     }
+}
+
+fn culled(entity: &DrawnEntity<'_>) -> vk::CullModeFlags {
+    if entity.culls { vk::CullModeFlags::BACK } else { vk::CullModeFlags::NONE }
 }
 
 /// A region of the picture, and what is drawn there.
@@ -228,8 +234,6 @@ pub struct PipelineMaker {
     device: Arc<Device>,
     library: Library,
     state: GraphicsState,
-    /// Where pixels evaluate sharp lights: how.
-    sharp: Option<SharpPermutation>,
 }
 
 impl PipelineMaker {
@@ -267,6 +271,8 @@ pub struct Draw {
     pub batch_triangles: u32,
     /// Whether [`Draw::make`] has made the pipelines of the scene.
     pub is_made: bool,
+    /// Pass "pixel light", which comes first where pixels evaluate sharp lights.
+    light: Option<LightImages>,
     /// Pass "smooth", which follows where outlines are smoothed.
     pub smooth: Option<Smooth>,
 }
@@ -283,7 +289,8 @@ impl Draw {
         let samples = antialias.samples(device);
         let shape = ImageShape { format: COLOR, width, height, samples: 1 };
         let state = GraphicsState { depth: Some(DEPTH), samples, ..GraphicsState::plain(COLOR) };
-        let maker = PipelineMaker { device: device.clone(), library: library.clone(), state, sharp: lights.pixels };
+        let maker = PipelineMaker { device: device.clone(), library: library.clone(), state };
+        let light = |sharp| LightImages::new(device, library, [width, height], sharp);
         Ok(Draw {
             triangles: DrawTriangles::new(maker.clone(), lights.highlights),
             grid: DrawGrid::new(maker),
@@ -294,23 +301,44 @@ impl Draw {
             picture: Image::new(device, "picture", shape)?,
             batch_triangles: if device.info.is_software() { 1 << 18 } else { u32::MAX / 3 },
             is_made: false,
+            light: lights.pixels.map(light).transpose()?,
             smooth: (antialias == Antialias::Outlines).then(|| Smooth::new(device, library, shape)).transpose()?,
         })
     }
 
     /// Makes the pipelines of these surfaces, and of grids if there are `grids`, on all cores: one may take a second to
     /// compile. Others are made where they are first drawn with.
-    pub fn make(&self, surfaces: HashSet<DrawnSurface>, grids: bool) -> Result<()> {
-        let grid = || if grids { self.grid.make() } else { Ok(()) };
-        let (triangles, grid) = rayon::join(|| self.triangles.make(surfaces), grid);
-        triangles.and(grid)
+    pub fn make(&self, surfaces: &HashSet<DrawnSurface>, grids: bool) -> Result<()> {
+        let by_pixel = self.light.is_some();
+        let grid = || if grids { self.grid.make(by_pixel) } else { Ok(()) };
+        let light = || {
+            let holes = |wanted: bool| surfaces.iter().any(|surface| !surface.transparent && surface.holes == wanted);
+            let triangles = [false, true].into_iter().filter(|&wanted| holes(wanted));
+            let triangles = triangles.map(|holes| Receiver::Triangles { holes });
+            let receivers: Vec<Receiver> = grids.then_some(Receiver::Grid).into_iter().chain(triangles).collect();
+            self.light.as_ref().map_or(Ok(()), |light| light.make(&receivers))
+        };
+        let (light, (triangles, grid)) =
+            rayon::join(light, || rayon::join(|| self.triangles.make(surfaces, by_pixel), grid));
+        light.and(triangles).and(grid)
     }
 
-    /// Device memory of a pixel in the images of [`Draw::new`], bytes.
-    pub fn pixel_bytes(device: &Device, antialias: Antialias) -> u64 {
+    /// Device memory of a pixel in the images of [`Draw::new`], bytes; `by_pixel` where pixels evaluate sharp lights.
+    pub fn pixel_bytes(device: &Device, antialias: Antialias, by_pixel: bool) -> u64 {
         let samples = u64::from(antialias.samples(device));
         let colors = 1 + u64::from(antialias == Antialias::Outlines) + if samples > 1 { samples } else { 0 };
-        colors * 8 + samples * 4
+        colors * 8 + samples * 4 + if by_pixel { LightImages::pixel_bytes() } else { 0 }
+    }
+
+    /// What pass "pixel light" fills for these viewports, if any of them has pixels that evaluate lights.
+    pub fn pixel_light(&self, viewports: &[DrawnViewport<'_>]) -> Option<&LightImages> {
+        self.light.as_ref().filter(|_| viewports.iter().any(|viewport| viewport.pixel.is_some()))
+    }
+
+    /// The light of an entity's pixels in a viewport.
+    fn light_of(&self, viewport: &DrawnViewport<'_>, entity: &DrawnEntity<'_>) -> Option<&Image> {
+        let has_pixels = viewport.pixel.is_some() && entity.by_pixel.is_some();
+        self.light.as_ref().filter(|_| has_pixels).map(LightImages::light)
     }
 
     pub fn samples(&self) -> u32 {
@@ -346,9 +374,6 @@ impl Draw {
             depth: Some(&self.depth),
             resolve: self.samples.as_ref().map(|_| &self.picture),
         };
-        if viewports.iter().any(|viewport| viewport.pixel.is_some()) {
-            commands.count_samples()?;
-        }
         let every = viewports.iter().flat_map(|viewport| {
             let opaque = viewport.entities.iter().filter(|entity| !entity.transparent);
             opaque.map(move |entity| (viewport, entity))
@@ -364,25 +389,31 @@ impl Draw {
             commands.render_part(&target, [number == 0, number + 1 == count], |drawing| {
                 let mut bound: Option<&DrawnEntity<'_>> = None;
                 for (viewport, entity, indices) in batch {
+                    let light = self.light_of(viewport, entity);
                     if bound.is_none_or(|bound| !std::ptr::eq(bound, entity)) {
-                        let [left, top, width, height] = viewport.area;
-                        drawing.area(left, top, width, height);
+                        drawing.area(viewport.area);
                         if let DrawnMesh::Triangles(mesh) = entity.mesh {
-                            self.triangles.bind(drawing, mesh, entity, viewport, white, false)?;
+                            self.triangles.bind(
+                                drawing,
+                                mesh,
+                                entity,
+                                viewport,
+                                white,
+                                DrawnLayer::Opaque { light },
+                            )?;
                         }
                         bound = Some(entity);
                     }
                     match entity.mesh {
                         DrawnMesh::Triangles(_) => drawing.indexed(indices),
                         DrawnMesh::Grid(grid, _) => {
-                            self.grid.record(drawing, (grid, indices), entity, viewport, white)?;
+                            self.grid.record(drawing, (grid, indices), entity, viewport, light, white)?;
                         }
                     }
                 }
                 if number + 1 < count {
                     return Ok(());
                 }
-                self.record_patches(drawing, viewports, white)?;
                 self.record_transparent(drawing, viewports, white)
             })?;
         }
@@ -397,49 +428,17 @@ impl Draw {
         white: f32,
     ) -> Result<()> {
         for viewport in viewports {
-            let [left, top, width, height] = viewport.area;
             for entity in viewport.entities.iter().filter(|entity| entity.transparent && !entity.indices.is_empty()) {
                 let DrawnMesh::Triangles(mesh) = entity.mesh else { continue };
-                drawing.area(left, top, width, height);
+                drawing.area(viewport.area);
                 // Of one entity the nearest place alone is seen, in whatever order its triangles come.
-                for depth in [true, false] {
-                    self.triangles.bind(drawing, mesh, entity, viewport, white, depth)?;
+                for layer in [DrawnLayer::Depth, DrawnLayer::Over] {
+                    self.triangles.bind(drawing, mesh, entity, viewport, white, layer)?;
                     entity.indices.iter().for_each(|range| drawing.indexed(range.clone()));
                 }
             }
         }
         Ok(())
-    }
-
-    /// Draws the patches of all grids and triangles, after everything that may hide them: a pixel of a patch costs
-    /// most.
-    fn record_patches<'r>(
-        &'r self,
-        drawing: &mut Drawing<'_, 'r>,
-        viewports: &[DrawnViewport<'r>],
-        white: f32,
-    ) -> Result<()> {
-        if viewports.iter().all(|viewport| viewport.pixel.is_none()) {
-            return Ok(());
-        }
-        drawing.counted(|drawing| {
-            for (viewport, light) in viewports.iter().filter_map(|viewport| Some((viewport, viewport.pixel.as_ref()?)))
-            {
-                let [left, top, width, height] = viewport.area;
-                drawing.area(left, top, width, height);
-                for entity in viewport.entities.iter().filter(|e| e.by_pixel.is_some() && !e.indices.is_empty()) {
-                    match entity.mesh {
-                        DrawnMesh::Grid(grid, _) => {
-                            self.grid.record_patches(drawing, grid, entity, viewport, light, white)?;
-                        }
-                        DrawnMesh::Triangles(mesh) => {
-                            self.triangles.record_patches(drawing, mesh, entity, viewport, light, white)?;
-                        }
-                    }
-                }
-            }
-            Ok(())
-        })
     }
 }
 

@@ -34,7 +34,7 @@ impl Show {
 
     /// Covers the target with the picture; `white` is the radiance that becomes white.
     pub fn record<'r>(&'r self, drawing: &mut Drawing<'_, 'r>, picture: &'r Image, white: f32) -> Result<()> {
-        drawing.area(0, 0, picture.shape.width, picture.shape.height);
+        drawing.area([0, 0, picture.shape.width, picture.shape.height]);
         let push = Push { gain: 1.0 / white, encode: u32::from(self.encode) };
         drawing.screen(&self.pipeline, &[Bind::Image(picture)], &push)
     }

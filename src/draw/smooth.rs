@@ -152,7 +152,7 @@ impl Smooth {
             drawing.resources(&[Bind::Image(picture), Bind::Image(depth)])?;
             for DrawnViewport { area, lines, .. } in viewports.iter().filter(|viewport| !viewport.lines.is_empty()) {
                 let [left, top, width, height] = *area;
-                drawing.area(left, top, width, height);
+                drawing.area(*area);
                 drawing.push(&[left, top, left + width - 1, top + height - 1].map(u32::cast_signed));
                 drawing.indexed(6 * lines.start..6 * lines.end);
             }

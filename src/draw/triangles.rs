@@ -1,14 +1,11 @@
-//! Part of pass "draw": meshes by their triangles, and those triangles again whose pixels evaluate sharp lights.
-//!
-//! A triangle is drawn again where the pass of sharp lights has marked one of its vertices and its sides span 4 px on
-//! the screen.
+//! Part of pass "draw": meshes by their triangles.
 
 use crate::asset::mesh::Mesh;
-use crate::draw::pixel_light::{PixelLight, texels};
-use crate::draw::{DrawnEntity, DrawnPaint, DrawnViewport, EntityPush, PipelineMaker, made_once};
+use crate::draw::pixel_light::{LIGHT_BINDING, shown_light, texels};
+use crate::draw::{DrawnEntity, DrawnPaint, DrawnViewport, EntityPush, PipelineMaker, culled, made_once};
 use crate::error::Result;
 use crate::gloss::{self, DrawnReflections};
-use crate::gpu::{Bind, Buffer, Device, Drawing, GraphicsPipeline, GraphicsState, Keeps, TexelView};
+use crate::gpu::{Bind, Buffer, Device, Drawing, GraphicsPipeline, GraphicsState, Image, Keeps, TexelView};
 use crate::layout::QUAD_FORMAT;
 use crate::lists::sight::TriangleRun;
 use crate::shaders::ShaderPermutation;
@@ -24,10 +21,6 @@ use std::sync::{Arc, OnceLock};
 /// Triangles in a run. They are few enough that most runs lie on one side of an object, and many enough that a draw
 /// call costs little beside them.
 const RUN_TRIANGLES: usize = 128;
-/// Triangles whose sides are all shorter on the screen, in pixels, have edges as fine as their vertices carry.
-const LEAST_PX: f64 = 4.0;
-/// How much nearer triangles are drawn that are drawn again, in steps of depth: their corners round as they did before.
-const NEARER_STEPS: f32 = 4.0;
 
 pub struct DrawnTriangles {
     /// Positions in metres from the centre of the bounding sphere.
@@ -82,7 +75,6 @@ impl DrawnTriangles {
     pub fn fits_views(&self, device: &Device, vertices: &Buffer, self_cells: &Buffer) -> bool {
         TexelView::fits(device, vk::Format::R32_UINT, self.indices.size_bytes)
             && TexelView::fits(device, vk::Format::R32G32_UINT, self_cells.size_bytes)
-            && TexelView::fits(device, vk::Format::R32_UINT, self.emission.size_bytes)
             && TexelView::fits(device, QUAD_FORMAT, vertices.size_bytes)
     }
 }
@@ -98,21 +90,7 @@ fn packed(tint: Vec3) -> f32 {
 #[derive(Clone, Copy, Pod, Zeroable)]
 struct PaintedPush {
     entity: EntityPush,
-    index: u32,
     padding: [f32; 2],
-    paint: [f32; 4],
-}
-
-#[repr(C)]
-#[derive(Clone, Copy, Pod, Zeroable)]
-struct PatchPush {
-    entity: EntityPush,
-    first: u32,
-    half_size: [f32; 2],
-    receiver: u32,
-    cluster_first: u32,
-    vertex_first: u32,
-    self_first: u32,
     paint: [f32; 4],
 }
 
@@ -139,6 +117,8 @@ pub struct DrawnSurface {
     /// Of a glossy one.
     pub detail: Option<Detail>,
     pub transparent: bool,
+    /// Whether a texture masks parts of it.
+    pub holes: bool,
 }
 
 /// What the pixels of a glossy surface look up.
@@ -163,40 +143,47 @@ impl Look<'_> {
         }
     }
 
-    /// The macros of both stages; `first` is the first binding of reflections.
-    fn macros(self, row: ShaderPermutation, first: u32) -> ShaderPermutation {
+    /// The macros of both stages.
+    fn macros(self, row: ShaderPermutation) -> ShaderPermutation {
         let row = row.define("PAINTED", !matches!(self, Look::Plain));
         let Look::Glossy { highlights, detail } = self else { return row.define("GLOSS", false) };
         gloss::macros(row)
             .define("GLOSS", true)
-            .define("GLOSS_BINDING", first)
+            .define("GLOSS_BINDING", GLOSS_BINDING)
             .define("HIGHLIGHTS", highlights.is_some())
             .define("MIRROR", detail != Detail::Rough)
             .define("TEXTURED", detail == Detail::Textured)
     }
 }
 
-/// Bindings of reflections in the shaders that show the light of vertices, and in those whose pixels evaluate lights.
-const GLOSS_BINDINGS: [u32; 2] = [2, 13];
+/// First binding of reflections.
+const GLOSS_BINDING: u32 = 2;
+
+/// What is drawn of an entity.
+#[derive(Clone, Copy)]
+pub enum DrawnLayer<'d> {
+    /// An opaque one, by the light of its pixels where they have any of their own.
+    Opaque { light: Option<&'d Image> },
+    /// Of a transparent one the depth of what is nearest.
+    Depth,
+    /// Its colour over what lies behind.
+    Over,
+}
 
 /// How the triangles of a surface become pixels.
 #[derive(Clone, Copy, PartialEq, Eq)]
-enum Form {
+pub enum Form {
     /// By the light of vertices.
     Vertices,
-    /// The same over what lies behind: first the depth of what is nearest, then its colour.
+    /// By the light of pixels where there is any, else of vertices.
+    Pixels,
+    /// By the light of vertices over what lies behind: first the depth of what is nearest, then its colour.
     OverDepth,
     Over,
-    /// Pixels evaluate sharp lights.
-    Pixels,
 }
 
 impl Form {
     const COUNT: usize = 4;
-}
-
-fn culled(entity: &DrawnEntity<'_>) -> vk::CullModeFlags {
-    if entity.culls { vk::CullModeFlags::BACK } else { vk::CullModeFlags::NONE }
 }
 
 pub struct DrawTriangles {
@@ -212,12 +199,12 @@ impl DrawTriangles {
         DrawTriangles { maker, highlights, made: Default::default() }
     }
 
-    /// Makes what surfaces are drawn with, on all cores.
-    pub fn make(&self, surfaces: HashSet<DrawnSurface>) -> Result<()> {
-        surfaces.into_par_iter().try_for_each(|surface| {
+    /// Makes what surfaces are drawn with, on all cores; `by_pixel` where pixels have light of their own.
+    pub fn make(&self, surfaces: &HashSet<DrawnSurface>, by_pixel: bool) -> Result<()> {
+        surfaces.par_iter().try_for_each(|surface| {
             let forms: &[Form] = match surface.transparent {
                 true => &[Form::OverDepth, Form::Over],
-                false if self.maker.sharp.is_some() => &[Form::Vertices, Form::Pixels],
+                false if by_pixel => &[Form::Pixels],
                 false => &[Form::Vertices],
             };
             let look = self.look_of(surface.painted, surface.detail);
@@ -226,21 +213,15 @@ impl DrawTriangles {
     }
 
     fn pipeline(&self, look: Look<'_>, form: Form) -> Result<&GraphicsPipeline> {
-        let PipelineMaker { state, sharp, .. } = &self.maker;
+        let state = self.maker.state;
         made_once(&self.made[look.number()][form as usize], || {
             let keeps = match form {
-                Form::Vertices => state.keeps,
+                Form::Vertices | Form::Pixels => state.keeps,
                 Form::OverDepth => Keeps::Depth,
                 Form::Over => Keeps::ColorOver,
-                Form::Pixels => {
-                    let sharp = sharp.as_ref().expect("pixels evaluate lights where a scene has sharp ones");
-                    let rows = Self::patch_rows(state.samples, look, sharp);
-                    let nearer = GraphicsState { nearer_steps: NEARER_STEPS, ..*state };
-                    return self.maker.make("draw triangle pixels", &rows, nearer);
-                }
             };
-            let rows = Self::rows(state.samples, look, form != Form::Vertices);
-            self.maker.make("draw", &rows, GraphicsState { keeps, ..*state })
+            let rows = Self::rows(state.samples, look, form);
+            self.maker.make("draw", &rows, GraphicsState { keeps, ..state })
         })
     }
 
@@ -273,30 +254,19 @@ impl DrawTriangles {
         std::array::from_fn(|k| Bind::Texture(maps[k].unwrap_or(neutral[k])))
     }
 
-    /// The rows of the shaders that show the light of vertices: vertex and fragment. With `over` what they draw lies over
-    /// what is behind it.
-    pub fn rows(samples: u32, look: Look<'_>, over: bool) -> [ShaderPermutation; 2] {
-        let row = |file| look.macros(ShaderPermutation::new(file, 4), GLOSS_BINDINGS[0]);
+    /// Vertex and fragment shader.
+    pub fn rows(samples: u32, look: Look<'_>, form: Form) -> [ShaderPermutation; 2] {
+        let row = |file| shown_light(look.macros(ShaderPermutation::new(file, 4)), form == Form::Pixels);
+        let over = matches!(form, Form::OverDepth | Form::Over);
         let fragment = row("draw.frag").define("OVER", over).define("SAMPLES", samples);
         let fragment = match look {
-            Look::Glossy { highlights: Some(sharp), .. } => sharp.pixel_row(fragment, false, false),
+            Look::Glossy { highlights: Some(sharp), .. } => sharp.highlight_row(fragment),
             _ => fragment,
         };
         [row("draw.vert"), fragment]
     }
 
-    /// The rows of the shaders whose pixels evaluate lights: vertex and fragment.
-    pub fn patch_rows(samples: u32, look: Look<'_>, sharp: &SharpPermutation) -> [ShaderPermutation; 2] {
-        let row = |file| look.macros(ShaderPermutation::new(file, 4), GLOSS_BINDINGS[1]);
-        let shows = matches!(look, Look::Glossy { highlights: Some(_), .. });
-        [
-            row("triangle.vert").number("LEAST_PX", LEAST_PX),
-            sharp.pixel_row(row("triangle.frag").define("SAMPLES", samples), sharp.self_shadows, shows),
-        ]
-    }
-
-    /// Makes ready to draw ranges of an entity's indices in the area that was set: of a transparent one the `depth`, or
-    /// the colour over what lies behind.
+    /// Makes ready to draw ranges of an entity's indices in the area that was set.
     pub fn bind<'r>(
         &'r self,
         drawing: &mut Drawing<'_, 'r>,
@@ -304,88 +274,42 @@ impl DrawTriangles {
         entity: &DrawnEntity<'r>,
         viewport: &DrawnViewport<'r>,
         white: f32,
-        depth: bool,
+        layer: DrawnLayer<'r>,
     ) -> Result<()> {
         let mut vertices =
             vec![(&mesh.positions, 0), (&mesh.emission, 0), (viewport.radiosity, entity.radiosity_offset)];
         let (look, paint, gloss) = self.look(entity, viewport);
         vertices.extend(mesh.paint.iter().filter(|_| paint.is_some()).map(|paint| (paint, 0)));
-        let form = match entity.transparent {
-            true if depth => Form::OverDepth,
-            true => Form::Over,
-            false => Form::Vertices,
+        let form = match layer {
+            DrawnLayer::Depth => Form::OverDepth,
+            DrawnLayer::Over => Form::Over,
+            DrawnLayer::Opaque { light: Some(_) } => Form::Pixels,
+            DrawnLayer::Opaque { light: None } => Form::Vertices,
         };
         drawing.bind(self.pipeline(look, form)?, &vertices, &mesh.indices);
         drawing.cull(culled(entity));
-        let push = EntityPush::new(entity, white);
-        match paint {
-            None => drawing.push(&push),
-            Some(paint) => {
-                let mut binds = vec![Bind::Texture(paint.texture)];
-                if let Some(gloss) = gloss {
-                    binds.extend(texels(&[(gloss.vertices, QUAD_FORMAT)])?);
-                    binds.extend(gloss.binds()?);
-                    binds.extend(Self::maps(entity, gloss));
-                    if self.highlights.is_some() {
-                        binds.extend(texels(&[(gloss.lights, QUAD_FORMAT)])?);
-                    }
-                }
-                drawing.resources(&binds)?;
-                drawing.push(&PaintedPush {
-                    entity: push,
-                    index: entity.index,
-                    padding: [0.0; 2],
-                    paint: paint.push(),
-                });
-            }
-        }
-        Ok(())
-    }
-
-    /// Draws the triangles of an entity again that a shadow's edge comes near. Their pixels evaluate sharp lights
-    /// themselves.
-    pub fn record_patches<'r>(
-        &'r self,
-        drawing: &mut Drawing<'_, 'r>,
-        mesh: &'r DrawnTriangles,
-        entity: &DrawnEntity<'r>,
-        viewport: &DrawnViewport<'r>,
-        light: &PixelLight<'r>,
-        white: f32,
-    ) -> Result<()> {
-        let Some(by_pixel) = entity.by_pixel.filter(|_| self.maker.sharp.is_some()) else { return Ok(()) };
-        let (look, paint, gloss) = self.look(entity, viewport);
-        drawing.bind(self.pipeline(look, Form::Pixels)?, &[], &mesh.indices);
-        drawing.cull(culled(entity));
-        let mut binds = light.binds(
-            &[(&mesh.indices, vk::Format::R32_UINT), (viewport.radiosity, QUAD_FORMAT)],
-            &[
-                (light.vertices, QUAD_FORMAT),
-                (&mesh.emission, vk::Format::R32_UINT),
-                (light.self_cells, vk::Format::R32G32_UINT),
-            ],
-        )?;
-        if let (Some(paint), Some(buffer)) = (paint, &mesh.paint) {
-            binds.extend(texels(&[(buffer, vk::Format::R32_UINT)])?);
+        let mut binds = Vec::new();
+        if let Some(paint) = paint {
             binds.push(Bind::Texture(paint.texture));
         }
         if let Some(gloss) = gloss {
+            binds.extend(texels(&[(gloss.vertices, QUAD_FORMAT)])?);
             binds.extend(gloss.binds()?);
             binds.extend(Self::maps(entity, gloss));
+            if self.highlights.is_some() {
+                binds.extend(texels(&[(gloss.lights, QUAD_FORMAT)])?);
+            }
+        }
+        if let DrawnLayer::Opaque { light: Some(light) } = layer {
+            binds.resize(LIGHT_BINDING as usize, Bind::None);
+            binds.push(Bind::Image(light));
         }
         drawing.resources(&binds)?;
-        let [_, _, width, height] = viewport.area;
-        drawing.push(&PatchPush {
-            entity: EntityPush::new(entity, white),
-            first: (entity.radiosity_offset / 16) as u32,
-            half_size: [0.5 * width as f32, 0.5 * height as f32],
-            receiver: entity.index,
-            cluster_first: by_pixel.cluster_first,
-            vertex_first: by_pixel.vertex_first,
-            self_first: by_pixel.self_first,
-            paint: paint.map_or([0.0; 4], |paint| paint.push()),
-        });
-        entity.indices.iter().for_each(|range| drawing.corners(range.clone()));
+        let push = EntityPush::new(entity, white);
+        match paint {
+            None => drawing.push(&push),
+            Some(paint) => drawing.push(&PaintedPush { entity: push, padding: [0.0; 2], paint: paint.push() }),
+        }
         Ok(())
     }
 }

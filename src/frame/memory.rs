@@ -28,7 +28,7 @@ impl PictureMemory {
     /// For pictures that a frame with these options makes for files.
     pub fn new(device: &Device, options: &Options) -> Self {
         let pixels = u64::from(options.size[0]) * u64::from(options.size[1]);
-        let pixel_bytes = Draw::pixel_bytes(device, options.antialias) + READBACK_PIXEL_BYTES;
+        let pixel_bytes = Draw::pixel_bytes(device, options.antialias, options.shades_pixels()) + READBACK_PIXEL_BYTES;
         PictureMemory {
             size: options.size,
             device: pixels * pixel_bytes,

@@ -39,6 +39,11 @@ pub struct Options {
 }
 
 impl Options {
+    /// Whether pixels evaluate the scene's sharp lights, if it has any.
+    pub(super) fn shades_pixels(&self) -> bool {
+        self.shading.unwrap_or_else(|| Shading::usual(self.antialias)) == Shading::Pixel
+    }
+
     /// What is baked: without the skip `static` every entity is a group by itself.
     pub(crate) fn baked(&self) -> bake::Options {
         bake::Options { groups: self.bake.groups && self.skip.grouped, ..self.bake }

@@ -1,7 +1,6 @@
 //! Permutations of a scene's passes: the options, restricted to features of the scene and limits of the device.
 
 use super::Options;
-use crate::draw::Shading;
 use crate::field::silhouette::SilhouetteField;
 use crate::gpu::{Buffer, Device, TexelView};
 use crate::layout::{DeviceEntity, QUAD_FORMAT};
@@ -81,8 +80,7 @@ pub(super) fn pixel_shading(
     sharp: Option<SharpPermutation>,
 ) -> Option<SharpPermutation> {
     let [nodes, cells, _] = buffers.sharp();
-    let wants = options.shading.unwrap_or_else(|| Shading::usual(options.antialias)) == Shading::Pixel;
-    sharp.filter(|_| wants && SharpPermutation::fits_views(device, [nodes, cells, soft]))
+    sharp.filter(|_| options.shades_pixels() && SharpPermutation::fits_views(device, [nodes, cells, soft]))
 }
 
 /// Whether any light of the scene meets the chains of the merge. The sky does in any case.

@@ -74,9 +74,10 @@ impl Frame {
             painted: self.scene.paint(index).is_some(),
             detail: gloss::detail(&self.scene.entities[index]).filter(|_| self.reflections.is_some()),
             transparent: self.scene.entities[index].transparent,
+            holes: self.scene.paint(index).is_some_and(|texture| texture.alpha_cutoff.is_some()),
         };
         let surfaces: HashSet<DrawnSurface> = triangles.into_iter().map(surface).collect();
-        self.picture.draw.make(surfaces, !grids.is_empty())
+        self.picture.draw.make(&surfaces, !grids.is_empty())
     }
 
     /// Input of [`super::record()`] for the picture that was prepared last; `white` as in [`Frame::render`].
@@ -181,14 +182,14 @@ impl Frame {
             soft: self.radiosity.soft(),
             self_cells: &self.buffers.self_cells,
             vertices: &self.buffers.vertices,
+            shown_lights: self.reflections.as_ref().map(|reflections| &reflections.shown_lights),
         })
     }
 
-    /// Pixels of a picture that evaluated sharp lights themselves, by the timings of its passes: the samples that they
-    /// wrote over the samples of a pixel. `None` where the device does not count, or no pixel was to.
+    /// Pixels of a picture that evaluated sharp lights themselves, by the timings of its passes. `None` where the device
+    /// does not count, or no pixel was to.
     pub fn pixels_evaluated(&self, timings: &[Timing]) -> Option<u64> {
-        let samples = u64::from(self.picture.draw.samples());
-        timings.iter().find_map(|timing| timing.samples).map(|written| written.div_ceil(samples))
+        timings.iter().find_map(|timing| timing.samples)
     }
 
     /// Makes pictures of another size from now on.

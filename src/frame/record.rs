@@ -106,6 +106,9 @@ pub fn record<'f>(
         for (image, access) in draw.attachments() {
             commands.image_barrier(image, None, access);
         }
+        if let Some(light) = draw.pixel_light(viewports) {
+            commands.pass("pixel light", |c| light.record(c, viewports))?;
+        }
         commands.pass("draw", |c| draw.record(c, viewports, *background, *white))?;
         if let Some(smooth) = &draw.smooth {
             // The pass copies the picture, and then reads picture and depth while it changes the copy.

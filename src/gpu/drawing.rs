@@ -172,20 +172,22 @@ impl<'r> Drawing<'_, 'r> {
         outcome
     }
 
-    /// Sets viewport and scissor to a rectangle in pixels.
-    pub fn area(&mut self, x: u32, y: u32, width: u32, height: u32) {
-        let viewport = vk::Viewport {
-            x: x as f32,
-            y: y as f32,
-            width: width as f32,
-            height: height as f32,
-            min_depth: 0.0,
-            max_depth: 1.0,
-        };
+    /// Sets viewport and scissor to a rectangle in pixels: left, top, width and height.
+    pub fn area(&mut self, area: [u32; 4]) {
+        self.area_of_texels(area, 1);
+    }
+
+    /// As [`Drawing::area`] for a target each of whose texels is `texel_px` pixels wide.
+    pub fn area_of_texels(&mut self, area: [u32; 4], texel_px: u32) {
+        let [x, y, width, height] = area.map(|px| px as f32 / texel_px as f32);
+        let viewport = vk::Viewport { x, y, width, height, min_depth: 0.0, max_depth: 1.0 };
         let (handle, buffer) = self.commands.raw();
         // SAFETY: the command buffer is recording.
         unsafe { handle.cmd_set_viewport(buffer, 0, &[viewport]) };
-        self.clip([x, y, width, height]);
+        let [x, y, width, height] = area;
+        let [left, top] = [x / texel_px, y / texel_px];
+        let [right, bottom] = [(x + width).div_ceil(texel_px), (y + height).div_ceil(texel_px)];
+        self.clip([left, top, right - left, bottom - top]);
     }
 
     pub fn clip(&mut self, [x, y, width, height]: [u32; 4]) {

@@ -217,16 +217,12 @@ pub struct GraphicsState {
     pub depth: Option<vk::Format>,
     pub samples: u32,
     pub keeps: Keeps,
-    /// How much nearer everything is drawn than it is, in steps of the largest depth of its triangle.
-    pub nearer_steps: f32,
-    /// How much nearer it is drawn besides, as far as its depth changes within so many pixels.
-    pub nearer_px: f32,
 }
 
 impl GraphicsState {
     /// One sample of that format without depth: all triangles are drawn, and the last one stays.
     pub fn plain(color: vk::Format) -> Self {
-        GraphicsState { color, depth: None, samples: 1, keeps: Keeps::Last, nearer_steps: 0.0, nearer_px: 0.0 }
+        GraphicsState { color, depth: None, samples: 1, keeps: Keeps::Last }
     }
 }
 
@@ -265,9 +261,6 @@ impl GraphicsPipeline {
         let raster = vk::PipelineRasterizationStateCreateInfo::default()
             .polygon_mode(vk::PolygonMode::FILL)
             .front_face(vk::FrontFace::COUNTER_CLOCKWISE)
-            .depth_bias_enable(state.nearer_steps != 0.0)
-            .depth_bias_constant_factor(state.nearer_steps)
-            .depth_bias_slope_factor(state.nearer_px)
             .line_width(1.0);
         let multisample = vk::PipelineMultisampleStateCreateInfo::default()
             .rasterization_samples(vk::SampleCountFlags::from_raw(state.samples));

@@ -154,7 +154,7 @@ impl Overlay {
     /// Draws over the picture what was prepared last.
     pub fn record<'r>(&'r self, drawing: &mut Drawing<'_, 'r>) -> Result<()> {
         let [width, height] = self.size;
-        drawing.area(0, 0, width, height);
+        drawing.area([0, 0, width, height]);
         for Run { texture, clip, indices } in &self.runs {
             let Some(texture) = self.textures.get(texture).filter(|_| !clip[2..].contains(&0)) else { continue };
             let vertices: &Buffer = &self.vertices;

@@ -278,7 +278,8 @@ fn faint_edges_are_left_to_vertices() {
 }
 
 /// Where nothing blocks a light, pixels of a mesh that shadows itself blend what its vertices see, as vertices do: a
-/// speck that hangs before a coarse ring has its pixels evaluate a sun, and only those that it shades differ.
+/// speck that hangs before a coarse ring has its pixels evaluate a sun, and only those that it shades differ. Light that is
+/// interpolated between every fourth pixel smooths the kinks between triangles of ten, which takes 0.012 of 0.15 at most.
 #[test]
 fn pixels_that_nothing_shades_look_as_vertices_show_them() {
     let Some(gpu) = gpu() else { return };
@@ -292,10 +293,10 @@ fn pixels_that_nothing_shades_look_as_vertices_show_them() {
     );
     let [(vertices, none), (pixels, evaluated)] =
         [Shading::Vertex, Shading::Pixel].map(|shading| picture(&gpu, &scene, shading));
-    let differ = |(a, b): &(&[f32], &[f32])| a.iter().zip(*b).any(|(a, b)| (a - b).abs() > 0.002);
+    let differ = |(a, b): &(&[f32], &[f32])| a.iter().zip(*b).any(|(a, b)| (a - b).abs() > 0.015);
     let differing = vertices.chunks_exact(3).zip(pixels.chunks_exact(3)).filter(differ).count() as u64;
     assert_eq!(none, None);
-    let few = evaluated.is_none_or(|evaluated| evaluated > 500 && differing < evaluated / 10);
+    let few = evaluated.is_none_or(|evaluated| evaluated > 300 && differing < evaluated / 10);
     assert!(few, "{evaluated:?} pixels evaluate the sun, {differing} differ");
     assert!(differing > 0, "the speck shades nothing");
 }

@@ -1,0 +1,10 @@
+// Push constants of a grid whose blocks are drawn in pass "pixel light".
+layout(push_constant) uniform Push {
+    mat4 clip_from_object;
+    uvec2 cells;
+    uint first;         // its first vertex in the radiosity buffer
+    uint receiver;      // the entity
+    uint cluster_first; // its first cluster among those whose chains are known
+    uint spare[3];
+    vec4 normal;        // object's frame
+} push;

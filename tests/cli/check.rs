@@ -49,7 +49,7 @@ fn a_wrong_shader_is_found() {
         ),
         ("silhouette_field.glsl", "foot + near.depth * along", "foot + 0.9 * near.depth * along", "sharp"),
         ("merge.comp", "float weight = above_horizon", "float weight = 0.999 * above_horizon", "merge"),
-        ("draw.frag", "finish(within * shown", "1.01 * finish(within * shown", "draw"),
+        ("draw.frag", "vec4(finish(shown", "vec4(1.01 * finish(shown", "draw"),
     ];
     for (file, from, to, pass) in wrong {
         let text = FILES.iter().find(|(name, _)| *name == file).unwrap().1;

@@ -29,12 +29,8 @@ void main() {
     uvec3 lit = push.first + found.vertices;
     vec3 light = blend(radiosity, lit, found.weights);
 #if PIXEL
-    uint marks = 0;
-    for (uint i = 0; i < 3; i++) {
-        marks |= unpack_marks(texelFetch(radiosity, int(lit[i])).w);
-    }
     vec4 shares = vec4(0.0);
-    find_light(push.entity, marks_edge(marks), light, shares);
+    find_light(push.entity, marks_edge(marks_of(radiosity, lit)), light, shares);
 #endif
     color = vec4(finish(push.emission_white.rgb + light, push.emission_white.w), push.tag);
 }

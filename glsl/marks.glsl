@@ -23,6 +23,12 @@ uint unpack_marks(float packed) {
     return packed == 0.0 ? 0 : (bits & 0x7fffff) | (bits >> 24 & 63) << 23 | (bits >> 31) << 29;
 }
 
+// Marks of the vertices of a triangle together, from the light of all vertices.
+uint marks_of(textureBuffer radiosity, uvec3 corners) {
+    return unpack_marks(texelFetch(radiosity, int(corners.x)).w) | unpack_marks(texelFetch(radiosity, int(corners.y)).w)
+         | unpack_marks(texelFetch(radiosity, int(corners.z)).w);
+}
+
 bool marks_edge(uint marks) {
     return (marks & 1) != 0;
 }

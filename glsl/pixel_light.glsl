@@ -29,10 +29,7 @@ layout(binding = 9) uniform utextureBuffer shown_lights_of; // of every entity
 
 // What the vertices of a pixel's triangle say of shadows: returns whether an edge is near, and keeps the rest.
 bool read_marks(uvec3 corners) {
-    uint marks = 0;
-    for (uint i = 0; i < 3; i++) {
-        marks |= unpack_marks(texelFetch(radiosity, int(corners[i])).w);
-    }
+    uint marks = marks_of(radiosity, corners);
     light_states = marks >> 1;
     near_occluders = marks >> 1 + 2 * MARKED_LIGHTS;
     return marks_edge(marks);

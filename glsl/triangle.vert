@@ -31,11 +31,7 @@ void main() {
 #if HOLES
     uv = uintBitsToFloat(uvec2(texelFetch(paints, int(3 * own)).x, texelFetch(paints, int(3 * own + 1)).x));
 #endif
-    uint marks = 0;
-    for (int i = 0; i < 3; i++) {
-        marks |= unpack_marks(texelFetch(radiosity, int(push.first + triangle[i])).w);
-    }
     // The same in every pipeline, so that what one of them has drawn lies at the depth at which another draws it.
     precise vec4 place = push.clip_from_object * vec4(position, 1.0);
-    gl_Position = marks_edge(marks) ? place : vec4(0.0, 0.0, 0.0, 1.0);
+    gl_Position = marks_edge(marks_of(radiosity, push.first + triangle)) ? place : vec4(0.0, 0.0, 0.0, 1.0);
 }

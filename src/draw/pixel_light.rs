@@ -11,6 +11,7 @@
 //! that are hidden or done where it has no others to test.
 
 use crate::draw::grid::{self, BLOCK_CELLS};
+use crate::draw::triangles::DrawnTriangles;
 use crate::draw::{DEPTH, DrawnEntity, DrawnMesh, DrawnPaint, DrawnViewport, PipelineMaker, culled, made_once};
 use crate::error::Result;
 use crate::gpu::{
@@ -110,11 +111,14 @@ impl Receiver {
     fn of(entity: &DrawnEntity<'_>) -> Self {
         match entity.mesh {
             DrawnMesh::Grid(..) => Receiver::Grid,
-            DrawnMesh::Triangles(mesh) => Receiver::Triangles {
-                holes: mesh.paint.is_some() && entity.paint.is_some_and(|paint| paint.alpha_cutoff > 0.0),
-            },
+            DrawnMesh::Triangles(mesh) => Receiver::Triangles { holes: mask(entity, mesh).is_some() },
         }
     }
+}
+
+/// What masks parts of an entity, and where the texture's coordinates are.
+fn mask<'r>(entity: &DrawnEntity<'r>, mesh: &'r DrawnTriangles) -> Option<(DrawnPaint<'r>, &'r Buffer)> {
+    entity.paint.filter(|paint| paint.alpha_cutoff > 0.0).zip(mesh.paint.as_ref())
 }
 
 #[repr(C)]
@@ -303,11 +307,11 @@ impl LightImages {
                 drawing.indexed(0..grid.patch_indices);
             }
             DrawnMesh::Triangles(mesh) => {
-                let paint = entity.paint.zip(mesh.paint.as_ref());
+                let mask = mask(entity, mesh);
                 drawing.bind(pipeline, &[], &mesh.indices);
                 drawing.cull(culled(entity));
                 let corners = (&mesh.indices, vk::Format::R32_UINT);
-                drawing.resources(&self.binds(viewport, light, corners, paint)?)?;
+                drawing.resources(&self.binds(viewport, light, corners, mask)?)?;
                 drawing.push(&TrianglePush {
                     clip_from_object,
                     first,
@@ -315,7 +319,7 @@ impl LightImages {
                     cluster_first: by_pixel.cluster_first,
                     vertex_first: by_pixel.vertex_first,
                     self_first: by_pixel.self_first,
-                    alpha_cutoff: paint.map_or(0.0, |(paint, _)| paint.alpha_cutoff),
+                    alpha_cutoff: mask.map_or(0.0, |(paint, _)| paint.alpha_cutoff),
                 });
                 entity.indices.iter().for_each(|range| drawing.corners(range.clone()));
             }
@@ -323,13 +327,13 @@ impl LightImages {
         Ok(())
     }
 
-    /// All bindings of all of its shaders. `paint` is a texture, and where its coordinates are.
+    /// All bindings of all of its shaders.
     fn binds<'r>(
         &'r self,
         viewport: &DrawnViewport<'r>,
         light: &PixelLight<'r>,
         corners: (&'r Buffer, vk::Format),
-        paint: Option<(DrawnPaint<'r>, &'r Buffer)>,
+        mask: Option<(DrawnPaint<'r>, &'r Buffer)>,
     ) -> Result<Vec<Bind<'r>>> {
         let [nodes, cells] = light.silhouettes;
         let pairs = vk::Format::R32G32_UINT;
@@ -347,7 +351,7 @@ impl LightImages {
         let texel = |buffer: &'r Buffer, format| TexelView::new(buffer, format).map(Bind::Texel);
         binds.push(light.shown_lights.map_or(Ok(Bind::None), |lights| texel(lights, grid::QUADS))?);
         binds.push(texel(light.self_cells, pairs)?);
-        match paint {
+        match mask {
             Some((paint, buffer)) => binds.extend([texel(buffer, vk::Format::R32_UINT)?, Bind::Texture(paint.texture)]),
             None => binds.extend([Bind::None, Bind::None]),
         }

@@ -74,7 +74,10 @@ impl Frame {
             painted: self.scene.paint(index).is_some(),
             detail: gloss::detail(&self.scene.entities[index]).filter(|_| self.reflections.is_some()),
             transparent: self.scene.entities[index].transparent,
-            holes: self.scene.paint(index).is_some_and(|texture| texture.alpha_cutoff.is_some()),
+            holes: self
+                .scene
+                .paint(index)
+                .is_some_and(|texture| texture.alpha_cutoff.is_some_and(|cutoff| cutoff > 0.0)),
         };
         let surfaces: HashSet<DrawnSurface> = triangles.into_iter().map(surface).collect();
         self.picture.draw.make(&surfaces, !grids.is_empty())

@@ -17,8 +17,8 @@ pub struct Case {
 
 impl Case {
     /// A scene at time 0.
-    pub fn at_start(name: String, scene: Scene, distant: Distant) -> Self {
-        Case { name, scene, time_s: 0.0, distant }
+    pub fn at_start(name: String, scene: Scene) -> Self {
+        Case { name, scene, time_s: 0.0, distant: Distant::Exact }
     }
 
     /// The scene of a file at the time of its first picture, named after the file.
@@ -31,7 +31,7 @@ impl Case {
             let name =
                 path.file_stem().map_or_else(|| path.display().to_string(), |name| name.to_string_lossy().into());
             let time_s = scene.data.output.time_s;
-            return Ok(Case { time_s, ..Case::at_start(name, scene, Distant::Exact) });
+            return Ok(Case { time_s, ..Case::at_start(name, scene) });
         };
         Err(Error::input(path, format!("{missing}, so there is no radiosity to judge")))
     }
@@ -65,7 +65,7 @@ pub fn scenes() -> Result<Vec<Case>> {
 pub fn scene(name: &str) -> Result<Case> {
     let path = Path::new(embedded::ROOT).join("scenes").join(format!("{name}.toml"));
     let scene = Scene::load(&path)?;
-    Ok(Case::at_start(name.to_owned(), scene, Distant::Exact))
+    Ok(Case::at_start(name.to_owned(), scene))
 }
 
 /// Cells along a side of the floor of [`teapot_lights`]: as many vertices as the floors of the embedded scenes have.
@@ -90,7 +90,7 @@ pub fn teapot_lights() -> Result<Vec<Case>> {
     ];
     let case = |(name, light, distant): (&str, String, Distant)| {
         let scene = Scene::parse(&format!("{head}{light}"), Path::new(PLACE), &embedded::read)?;
-        Ok(Case::at_start(name.to_owned(), scene, distant))
+        Ok(Case { distant, ..Case::at_start(name.to_owned(), scene) })
     };
     lights.into_iter().map(case).collect()
 }

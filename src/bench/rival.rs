@@ -8,7 +8,6 @@
 //! frame of ours draws its picture, and the rival is given what each pixel shows and lights that; the time of a plain
 //! drawing is added to its own.
 
-use super::budget::{Reference, device_radiosity};
 use super::cases::Case;
 use super::figures::{Radiosity, Spread, VertexDifference, along, crossing, spread};
 use super::judged::{Judged, JudgedAt, PIXEL_SIZE};
@@ -18,7 +17,7 @@ use crate::error::Result;
 use crate::frame::{self, Frame};
 use crate::scene::light::has_sharp;
 use crate::scene::{Lights, Placement};
-use crate::truth::{RayCast, RayMeshes, Vertex, World};
+use crate::truth::{RayCast, RayMeshes, World};
 use serde::Serialize;
 use std::time::Instant;
 
@@ -125,18 +124,8 @@ impl Merged {
         Ok(started.elapsed().as_secs_f64() * 1e3)
     }
 
-    /// Radiosity of the compared points.
-    fn found(&self, judged: &Judged) -> Result<Vec<Radiosity>> {
-        if judged.place == JudgedAt::Vertices {
-            return device_radiosity(&self.frame, &judged.keys().collect::<Vec<_>>());
-        }
-        let picture = self.frame.picture();
-        let pixel = |key: Vertex| std::array::from_fn(|c| f64::from(picture[3 * key.index + c]));
-        Ok(judged.keys().map(pixel).collect())
-    }
-
     fn comparison(&self, case: &Case, judged: &Judged, rival: &[RivalPoint]) -> Result<Comparison> {
-        let merge_error = judged.error(&self.found(judged)?);
+        let merge_error = judged.error(&judged.found(&self.frame)?);
         let errors: Vec<(f64, f64)> = rival.iter().map(|p| (f64::from(p.rays), p.error.rms)).collect();
         let times: Vec<(f64, f64)> = rival.iter().map(|p| (f64::from(p.rays), p.wall_ms.median)).collect();
         let rays_at_equal_rms = crossing(&errors, merge_error.rms);
@@ -171,14 +160,13 @@ impl Merged {
 
 /// Measures merge and ray casting in turns, at vertices and at pixels: where a light can be sharp, with
 /// sharp lights and with lights in SH, at pixels also with sharp lights by vertex.
-pub fn compare(bench: &Bench<'_>, case: &Case, reference: &Reference) -> Result<Vec<Comparison>> {
+pub fn compare(bench: &Bench<'_>, case: &Case, vertices: &Judged) -> Result<Vec<Comparison>> {
     let shapes = RayMeshes::new(&case.scene);
     let world = World::new(&case.scene, &shapes, &case.scene.at(case.time_s));
+    let pixels = Judged::pixels(bench, case, &world);
     let mut comparisons = Vec::new();
-    for judged in
-        std::iter::once(Judged::vertices(&world, reference)).chain(Judged::pixels(bench, &world, case.distant))
-    {
-        comparisons.extend(compare_at(bench, case, &shapes, &judged)?);
+    for judged in std::iter::once(vertices).chain(&pixels) {
+        comparisons.extend(compare_at(bench, case, &shapes, judged)?);
     }
     Ok(comparisons)
 }

@@ -1,7 +1,7 @@
 //! `bench scaling`: time and memory of a frame as vertices, entities and lights increase.
 
-use super::budget::{Reference, device_radiosity};
 use super::figures::{Spread, spread};
+use super::judged::Judged;
 use super::town::{Town, moved};
 use super::{Bench, default_options, merge_ms};
 use crate::error::{Error, Result};
@@ -85,9 +85,9 @@ fn error(bench: &Bench<'_>, frame: &mut Frame, placements: &[Placement]) -> Resu
     let shapes = RayMeshes::new(&scene);
     let world = World::new(&scene, &shapes, placements);
     let cast = RayCast { rays: if bench.quick { 256 } else { 1024 }, seed: bench.seed, ..Default::default() };
-    let reference = Reference::new(&world, if bench.quick { 64 } else { 256 }, &cast);
+    let judged = Judged::vertices(&world, if bench.quick { 64 } else { 256 }, &cast);
     frame.render(placements, None)?;
-    Ok(reference.error(&device_radiosity(frame, &reference.vertices)?).rms)
+    Ok(judged.error(&judged.found(frame)?).rms)
 }
 
 fn point(bench: &Bench<'_>, axis: &'static str, town: Town) -> Result<ScalingPoint> {

@@ -1,8 +1,8 @@
 //! `bench skip`: what each skip saves and what it does to the error against ray casting, with it off and on in turns.
 
-use super::budget::{Reference, device_radiosity};
 use super::cases::{self, Case};
 use super::figures::{Spread, VertexDifference, difference, spread};
+use super::judged::Judged;
 use super::town::{Town, moved};
 use super::{Bench, default_options, merge_ms};
 use crate::draw::Antialias;
@@ -10,7 +10,6 @@ use crate::error::Result;
 use crate::frame::{self, Frame};
 use crate::lists::skip::{EPS, Skip, SkipRow, TABLE};
 use crate::scene::{Placement, Scene};
-use crate::truth::raycast::Distant;
 use crate::truth::{RayCast, RayMeshes, World};
 use serde::Serialize;
 use std::time::Instant;
@@ -69,7 +68,7 @@ pub fn run(bench: &Bench<'_>, cases: &[Case]) -> Result<Vec<SkipCost>> {
 pub fn all(quick: bool) -> Result<Vec<Case>> {
     let town = |things, lights, cells| -> Result<Case> {
         let scene = Town { things, lights, cells, receive: true }.scene()?;
-        Ok(Case::at_start(format!("town of {things}, {lights} lights"), scene, Distant::Exact))
+        Ok(Case::at_start(format!("town of {things}, {lights} lights"), scene))
     };
     if quick {
         return Ok(vec![cases::scene("torus_over_plane")?, town(64, 4, 80)?]);
@@ -86,8 +85,8 @@ fn of_case(bench: &Bench<'_>, case: &Case) -> Result<Vec<SkipCost>> {
     let world = World::new(&case.scene, &shapes, &placements);
     let rays = if bench.quick { 512 } else { 4096 };
     let cast = RayCast { rays, seed: bench.seed, distant: case.distant, ..Default::default() };
-    let reference = Reference::new(&world, if bench.quick { 500 } else { 1500 }, &cast);
-    (bench.progress)(&format!("{}: relative standard error of T0 {:.1e}", case.name, reference.t0_error));
+    let judged = Judged::vertices(&world, if bench.quick { 500 } else { 1500 }, &cast);
+    (bench.progress)(&format!("{}: relative standard error of T0 {:.1e}", case.name, judged.t0_error));
 
     let at_rest = default_options();
     let kept = frame::Options { skip: Skip::ALL, ..at_rest };
@@ -101,14 +100,14 @@ fn of_case(bench: &Bench<'_>, case: &Case) -> Result<Vec<SkipCost>> {
         };
         let mut off = base;
         *off.skip.switch(name).expect("a skip with a switch") = false;
-        rows.push(row(bench, case, &reference, &placements, &what, [off, base], motion)?);
+        rows.push(row(bench, case, &judged, &placements, &what, [off, base], motion)?);
     }
     let what = format!("eps {EPS}");
     let without_eps = frame::Options { eps: 0.0, ..at_rest };
-    rows.push(row(bench, case, &reference, &placements, &what, [without_eps, at_rest], Motion::AtRest)?);
+    rows.push(row(bench, case, &judged, &placements, &what, [without_eps, at_rest], Motion::AtRest)?);
     let none = frame::Options { eps: 0.0, skip: Skip::NONE, ..at_rest };
     let what = "all but unmoved";
-    rows.push(row(bench, case, &reference, &placements, what, [none, at_rest], Motion::AtRest)?);
+    rows.push(row(bench, case, &judged, &placements, what, [none, at_rest], Motion::AtRest)?);
     Ok(rows)
 }
 
@@ -163,7 +162,7 @@ fn in_turns(
 fn row(
     bench: &Bench<'_>,
     case: &Case,
-    reference: &Reference,
+    judged: &Judged,
     placements: &[Placement],
     what: &str,
     [off, on]: [frame::Options; 2],
@@ -176,13 +175,13 @@ fn row(
     let mut found = Vec::new();
     for frame in &mut frames {
         frame.render(placements, None)?;
-        found.push(device_radiosity(frame, &reference.vertices)?);
+        found.push(judged.found(frame)?);
     }
     let side = |i: usize| Side {
         frame_ms: spread(&walls[i]),
         merge_ms: spread(&merges[i]),
         entries: entries[i],
-        error: reference.error(&found[i]),
+        error: judged.error(&found[i]),
     };
     let off = side(0);
     let on = side(1);
@@ -192,7 +191,7 @@ fn row(
         skip: what.to_owned(),
         vertices: frames[0].receiver_vertex_count(),
         times_faster: off.frame_ms.median / on.frame_ms.median,
-        change: difference(&found[0], &found[1], reference.unit),
+        change: difference(&found[0], &found[1], judged.unit),
         off,
         on,
     })

@@ -9,7 +9,6 @@ use crate::field::{Lattice, Storage};
 use crate::frame::{self, Frame};
 use crate::scene::Scene;
 use crate::sh::lobe::clamped_cosine;
-use crate::truth::raycast::Distant;
 use crate::truth::receiver_vertices;
 use glam::{DVec3, Vec3};
 use serde::Serialize;
@@ -134,7 +133,7 @@ fn entity(mesh: &str, more: &str) -> String {
 /// All trials; chains of occluders of up to `longest`.
 pub fn cases(longest: usize) -> Result<Vec<Case>> {
     let mut out = Vec::new();
-    let mut add = |name: String, scene: Scene| out.push(Case::at_start(name, scene, Distant::Exact));
+    let mut add = |name: String, scene: Scene| out.push(Case::at_start(name, scene));
     for (name, places) in TRIALS {
         let balls: String = places.split(';').map(|place| entity("ball", place.trim())).collect();
         add((*name).to_owned(), scene(40, GRADIENT, &format!("{FLOOR}{balls}"))?);

@@ -1,8 +1,9 @@
 //! `bench time-error`: error budgets, run time against error, and ray casting beside it.
 
-use super::budget::{Budget, Effort, Reference, budget, device_radiosity};
+use super::budget::{Budget, budget};
 use super::cases::{self, Case};
 use super::figures::{Spread, VertexDifference, spread};
+use super::judged::Judged;
 use super::rival::{Comparison, compare};
 use super::{Bench, default_options, merge_ms};
 use crate::bake::{self, Quality};
@@ -34,20 +35,19 @@ pub struct QualityPoint {
 /// Measures every case.
 pub fn run(bench: &Bench<'_>, cases: &[Case]) -> Result<TimeErrorOutcome> {
     let mut outcome = TimeErrorOutcome::default();
-    let effort = Effort::new(bench.quick);
     for (index, case) in cases.iter().enumerate() {
         (bench.progress)(&format!("case {} of {}, {}: casting rays", index + 1, cases.len(), case.name));
-        let reference = Reference::of_case(case, effort, bench.seed)?;
-        outcome.budgets.push(budget(bench, case, &reference, default_options())?);
+        let judged = Judged::vertices_of(bench, case)?;
+        outcome.budgets.push(budget(bench, case, &judged, default_options())?);
         (bench.progress)(&format!("{}: errors split into their causes", case.name));
-        outcome.qualities.extend(qualities(bench, case, &reference)?);
-        outcome.comparisons.extend(compare(bench, case, &reference)?);
+        outcome.qualities.extend(qualities(bench, case, &judged)?);
+        outcome.comparisons.extend(compare(bench, case, &judged)?);
     }
     Ok(outcome)
 }
 
 /// All qualities on the same vertices, rendered in turns, so that whatever else the machine does meets all alike.
-fn qualities(bench: &Bench<'_>, case: &Case, reference: &Reference) -> Result<Vec<QualityPoint>> {
+fn qualities(bench: &Bench<'_>, case: &Case, judged: &Judged) -> Result<Vec<QualityPoint>> {
     let placements = case.scene.at(case.time_s);
     let base = default_options();
     let frame = |quality: Quality| {
@@ -74,7 +74,7 @@ fn qualities(bench: &Bench<'_>, case: &Case, reference: &Reference) -> Result<Ve
             quality: format!("{quality:?}").to_lowercase(),
             field_bytes: frame.buffers.fields.size_bytes,
             merge_ms: spread(times),
-            error: reference.error(&device_radiosity(frame, &reference.vertices)?),
+            error: judged.error(&judged.found(frame)?),
         })
     };
     all.iter().zip(&frames).zip(&times).map(point).collect()

@@ -11,13 +11,25 @@ fn refused(folder: &Folder, file: &str, parts: &[&str]) {
     folder.refused(&format!("import {file} -o out.toml"), 4, &[&[start.as_str()], parts].concat());
 }
 
-/// As [`refused`], for a model after a change of its JSON.
-fn refused_after(change: impl FnOnce(&mut Value), parts: &[&str]) {
+/// As [`refused`], for a model.
+fn refused_model(model: &Model, parts: &[&str]) {
     let folder = Folder::new();
-    let mut model = room();
-    change(&mut model.json);
     model.write(folder.path(), "m");
     refused(&folder, "m.glb", parts);
+}
+
+/// As [`refused`], for a model after a change of its JSON.
+fn refused_after(change: impl FnOnce(&mut Value), parts: &[&str]) {
+    let mut model = room();
+    change(&mut model.json);
+    refused_model(&model, parts);
+}
+
+/// As [`refused`], for the room with one value of its JSON after another replaced.
+fn refused_values(rows: &[(&str, Value, [&str; 2])]) {
+    for (path, value, parts) in rows {
+        refused_after(|json| *json.pointer_mut(path).unwrap() = value.clone(), parts);
+    }
 }
 
 #[test]
@@ -60,8 +72,7 @@ fn containers_that_are_cut_off_or_damaged() {
 
 #[test]
 fn indices_out_of_range() {
-    let set = |path: &'static str, value: Value| move |json: &mut Value| *json.pointer_mut(path).unwrap() = value;
-    for (path, value, parts) in [
+    refused_values(&[
         ("/nodes/0/mesh", json!(99), ["nodes[0].mesh: ", "out of range"]),
         ("/scenes/0/nodes/0", json!(99), ["scenes[0].nodes[0]: ", "out of range"]),
         (
@@ -88,34 +99,27 @@ fn indices_out_of_range() {
         ("/animations/0/samplers/0/input", json!(99), ["animations[0].samplers[0].input: ", "out of range"]),
         ("/nodes/3/extensions/KHR_lights_punctual/light", json!(9), ["nodes[3]", "out of range"]),
         ("/nodes/4/camera", json!(9), ["nodes[4].camera: ", "out of range"]),
-    ] {
-        refused_after(set(path, value), &parts);
-    }
+    ]);
     // An index of a vertex that is not there.
-    let folder = Folder::new();
     let mut model = Model::default();
     let positions = model.positions(&[0., 0., 0., 1., 0., 0., 0., 1., 0.]);
     let indices = model.indices(&[0, 1, 3]);
     let mesh = model.mesh(json!({ "POSITION": positions }), Some(indices), None);
     model.node(json!({ "mesh": mesh }));
-    model.write(folder.path(), "m");
-    refused(&folder, "m.glb", &["index 3 is out of range: there are 3", "meshes[0].primitives[0]"]);
+    refused_model(&model, &["index 3 is out of range: there are 3", "meshes[0].primitives[0]"]);
 }
 
 #[test]
 fn numbers_out_of_range() {
-    let folder = Folder::new();
     for bad in [f32::NAN, f32::INFINITY] {
         let mut model = Model::default();
         let positions = model.positions(&[0., 0., 0., 1., 0., 0., 0., 1., 0.]);
         model.bytes[16..20].copy_from_slice(&bad.to_le_bytes());
         let mesh = model.mesh(json!({ "POSITION": positions }), None, None);
         model.node(json!({ "mesh": mesh }));
-        model.write(folder.path(), "m");
-        refused(&folder, "m.glb", &["accessors[0]: a number of element 1 is not finite"]);
+        refused_model(&model, &["accessors[0]: a number of element 1 is not finite"]);
     }
-    let set = |path: &'static str, value: Value| move |json: &mut Value| *json.pointer_mut(path).unwrap() = value;
-    for (path, value, parts) in [
+    refused_values(&[
         ("/nodes/1/translation", json!([0, 1e9, 0]), ["nodes[1]: ", "too large"]),
         ("/nodes/1/translation", json!([0, 1e300, 0]), ["its JSON: ", "out of range"]),
         ("/nodes/4/rotation", json!([0, 0, 0, 0]), ["nodes[4]: ", "its rotation is 0"]),
@@ -130,18 +134,14 @@ fn numbers_out_of_range() {
             json!("spot"),
             ["extensions.KHR_lights_punctual.lights[0].spot: ", "it is missing"],
         ),
-    ] {
-        refused_after(set(path, value), &parts);
-    }
+    ]);
     // Times that do not increase.
     let mut model = room();
     model.animate(0, 0, "translation", "LINEAR", &[0., 2., 1.], &[0.; 9]);
-    model.write(folder.path(), "m");
-    refused(&folder, "m.glb", &["animations[0].channels[1]: ", "times that increase"]);
+    refused_model(&model, &["animations[0].channels[1]: ", "times that increase"]);
     let mut model = room();
     model.animate(0, 0, "translation", "CUBICSPLINE", &[0., 2.], &[0.; 6]);
-    model.write(folder.path(), "m");
-    refused(&folder, "m.glb", &["animations[0].channels[1]: ", "2 times have 2 values, not 3 each"]);
+    refused_model(&model, &["animations[0].channels[1]: ", "2 times have 2 values, not 3 each"]);
 }
 
 #[test]
@@ -227,7 +227,6 @@ fn commands_agree() {
 /// Small files that ask for much: told before anything of that size is made.
 #[test]
 fn bombs() {
-    let folder = Folder::new();
     let started = std::time::Instant::now();
     // Elements of a sparse accessor take no bytes in the file.
     let mut model = Model::default();
@@ -239,30 +238,26 @@ fn bombs() {
     let positions = model.push("accessors", json);
     let mesh = model.mesh(json!({ "POSITION": positions }), None, None);
     model.node(json!({ "mesh": mesh }));
-    model.write(folder.path(), "m");
-    refused(&folder, "m.glb", &["accessors[0]: a count of 4000000000"]);
+    refused_model(&model, &["accessors[0]: a count of 4000000000"]);
     // The same, within the limit but used by many.
     model.json["accessors"][positions]["count"] = json!(3_000_000);
     let primitive = model.json["meshes"][mesh]["primitives"][0].clone();
     model.json["meshes"][mesh]["primitives"] = json!(vec![primitive; 1000]);
     model.json["meshes"][mesh]["primitives"][0]["mode"] = json!(0);
-    model.write(folder.path(), "m");
-    refused(&folder, "m.glb", &[]);
+    refused_model(&model, &[]);
     // A texture that states a huge size.
     let mut model = room();
     let view = model.view(&crate::common::huge_png());
     let image = model.push("images", json!({ "bufferView": view, "mimeType": "image/png" }));
     let texture = model.push("textures", json!({ "source": image }));
     model.json["materials"][0]["pbrMetallicRoughness"]["baseColorTexture"] = json!({ "index": texture });
-    model.write(folder.path(), "m");
-    refused(&folder, "m.glb", &["images[0]: 65535 x 65535 pixels"]);
+    refused_model(&model, &["images[0]: 65535 x 65535 pixels"]);
     // One node for each of more entities than a scene has.
     let mut model = room();
     for _ in 0..4200 {
         model.node(json!({ "mesh": 0 }));
     }
-    model.write(folder.path(), "m");
-    refused(&folder, "m.glb", &["over the limit of 4096 entities"]);
+    refused_model(&model, &["over the limit of 4096 entities"]);
     // Keys count for every node that they carry.
     let mut model = room();
     let times: Vec<f32> = (0..60_000_u16).map(f32::from).collect();
@@ -270,7 +265,6 @@ fn bombs() {
     for _ in 0..20 {
         model.child(0, json!({ "mesh": 0 }));
     }
-    model.write(folder.path(), "m");
-    refused(&folder, "m.glb", &["over the limit of 1000000 keys"]);
+    refused_model(&model, &["over the limit of 1000000 keys"]);
     assert!(started.elapsed().as_secs() < 60, "{:?}", started.elapsed());
 }

@@ -177,13 +177,7 @@ impl Motion {
             Motion::Orbit { period_s, .. } | Motion::Spin { period_s, .. } | Motion::Bob { period_s, .. } => {
                 [0.0, period_s.abs()]
             }
-            Motion::Node(node) => {
-                let position = node.position_keys.as_ref().map(|keys| &keys.times_s);
-                let rotation = node.rotation_keys.as_ref().map(|keys| &keys.times_s);
-                let scale = node.scale_keys.as_ref().map(|keys| &keys.times_s);
-                let times = || [position, rotation, scale].into_iter().flatten().flatten().copied();
-                [times().fold(0.0, f64::min), times().fold(0.0, f64::max)]
-            }
+            Motion::Node(node) => [node.times_s().fold(0.0, f64::min), node.times_s().fold(0.0, f64::max)],
         }
     }
 }
@@ -219,11 +213,12 @@ impl Node {
         Node { position, rotation, scale, position_keys: None, rotation_keys: None, scale_keys: None }
     }
 
-    /// How many keys it has.
-    pub fn key_count(&self) -> usize {
-        self.position_keys.as_ref().map_or(0, |keys| keys.times_s.len())
-            + self.rotation_keys.as_ref().map_or(0, |keys| keys.times_s.len())
-            + self.scale_keys.as_ref().map_or(0, |keys| keys.times_s.len())
+    /// Times of all its keys, seconds.
+    pub(super) fn times_s(&self) -> impl Iterator<Item = f64> {
+        let position = self.position_keys.as_ref().map(|keys| &keys.times_s);
+        let rotation = self.rotation_keys.as_ref().map(|keys| &keys.times_s);
+        let scale = self.scale_keys.as_ref().map(|keys| &keys.times_s);
+        [position, rotation, scale].into_iter().flatten().flatten().copied()
     }
 
     /// Where it stands at `time_s` seconds. Cubic keys that leave the range of a scene file end at its limits.

@@ -121,6 +121,7 @@ pub fn stands(document: &Document, tracks: &[Option<Tracks>], notes: &mut Notes)
         }
         let moves = tracks[index].as_ref().filter(|tracks| tracks.move_the_node());
         let stand = placed(document, index, &outer, moves, notes)?;
+        let key_count = |motion: &Motion| if let Motion::Node(node) = motion { node.times_s().count() } else { 0 };
         keys += stand.motion.iter().map(|motion| 1 + key_count(motion)).sum::<usize>();
         if keys > KEY_LIMIT {
             return Err(document.fail(place, format!("over the limit of {KEY_LIMIT} keys, counted for every node")));
@@ -185,13 +186,6 @@ fn instances(document: &Document, index: usize) -> Result<Option<Vec<DAffine3>>>
     };
     let all: Option<Vec<_>> = (0..count).map(instance).collect();
     all.map(Some).ok_or_else(|| document.fail(place, "an instance is too large, too far out, or its rotation is 0"))
-}
-
-fn key_count(motion: &Motion) -> usize {
-    match motion {
-        Motion::Node(node) => node.key_count(),
-        _ => 0,
-    }
 }
 
 /// Where a node stands within its parent.

@@ -76,20 +76,12 @@ pub fn pierced(mesh: &Mesh, texture: &Texture) -> Option<Mesh> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::asset::texture::{Texels, Wrap};
-    use std::sync::Arc;
+    use crate::asset::texture::{half_solid, square};
 
     #[test]
     fn a_half_that_is_not_there_is_cut_off() {
-        let corners = [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]];
-        let positions = corners.map(|[x, y]| Vec3::new(x, y, 0.0)).to_vec();
-        let attributes = Attributes { uvs: Some(corners.map(Vec2::from).to_vec()), ..Attributes::default() };
-        let triangles = vec![[0, 1, 2], [0, 2, 3]];
-        let mesh = Mesh::with_attributes("square", positions, Vec::new(), attributes, triangles).unwrap();
-        let rgba = (0..64 * 64).map(|i| [255, 255, 255, if i % 64 < 24 { 255 } else { 0 }]).collect();
-        let texels = Some(Arc::new(Texels { width: 64, height: 64, rgba }));
-        let mut texture =
-            Texture { texels, wrap: [Wrap::Repeat; 2], factor: Vec3::ONE, alpha_cutoff: Some(0.5), alpha_blend: false };
+        let mesh = square();
+        let mut texture = half_solid(64, 24);
         let left = pierced(&mesh, &texture).unwrap();
         assert!((left.area_m2() - 0.375).abs() < 0.02, "{}", left.area_m2());
         assert_eq!(left.bounding_sphere(), mesh.bounding_sphere());

@@ -279,31 +279,34 @@ fn middles(cuts: usize) -> impl Iterator<Item = [f32; 3]> {
     (0..cuts).flat_map(row)
 }
 
+/// A square of one metre whose texture coordinates are its x and y.
+#[cfg(test)]
+pub(crate) fn square() -> Mesh {
+    let corners = [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]].map(Vec2::from);
+    let attributes = super::mesh::Attributes { uvs: Some(corners.to_vec()), ..Default::default() };
+    let positions = corners.map(|corner| corner.extend(0.0)).to_vec();
+    Mesh::with_attributes("square", positions, Vec::new(), attributes, vec![[0, 1, 2], [0, 2, 3]]).unwrap()
+}
+
+/// A texture of so many white texels in both directions, with holes in the columns from `solid` on.
+#[cfg(test)]
+pub(crate) fn half_solid(size: usize, solid: usize) -> Texture {
+    let rgba = (0..size * size).map(|i| [255, 255, 255, if i % size < solid { 255 } else { 0 }]).collect();
+    let texels = Some(Arc::new(Texels { width: size, height: size, rgba }));
+    Texture { texels, wrap: [Wrap::Repeat; 2], factor: Vec3::ONE, alpha_cutoff: Some(0.5), alpha_blend: false }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::asset::mesh::Attributes;
-
-    fn square(texels: Texels, factor: Vec3) -> Vec3 {
-        let positions = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [1.0, 1.0, 0.0], [0.0, 1.0, 0.0]].map(Vec3::from).to_vec();
-        let uvs = [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]].map(Vec2::from).to_vec();
-        let attributes = Attributes { uvs: Some(uvs), ..Attributes::default() };
-        let mesh =
-            Mesh::with_attributes("square", positions, Vec::new(), attributes, vec![[0, 1, 2], [0, 2, 3]]).unwrap();
-        Texture {
-            texels: Some(Arc::new(texels)),
-            wrap: [Wrap::Repeat; 2],
-            factor,
-            alpha_cutoff: None,
-            alpha_blend: false,
-        }
-        .mean(&mesh)
-    }
 
     #[test]
     fn the_mean_of_a_half_white_texture_is_half_its_factor() {
         let rgba = (0..64 * 64).map(|i| if i % 64 < 32 { [255; 4] } else { [0, 0, 0, 255] }).collect();
-        let mean = square(Texels { width: 64, height: 64, rgba }, Vec3::new(1.0, 0.5, 0.0));
+        let texels = Some(Arc::new(Texels { width: 64, height: 64, rgba }));
+        let factor = Vec3::new(1.0, 0.5, 0.0);
+        let wrap = [Wrap::Repeat; 2];
+        let mean = Texture { texels, wrap, factor, alpha_cutoff: None, alpha_blend: false }.mean(&square());
         assert!((mean - Vec3::new(0.5, 0.25, 0.0)).abs().max_element() < 0.01, "{mean}");
     }
 

@@ -367,8 +367,7 @@ impl Blockers {
 mod tests {
     use super::*;
     use crate::asset::generate;
-    use crate::asset::mesh::Attributes;
-    use crate::asset::texture::Texels;
+    use crate::asset::texture::{half_solid, square};
     use crate::sh::quadrature::random_direction;
     use std::sync::Arc;
 
@@ -416,17 +415,9 @@ mod tests {
     /// A ray passes the holes of squares that stand one behind the other, up to the first place that is none.
     #[test]
     fn rays_pass_holes() {
-        let corners = [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]];
-        let positions = corners.map(|[x, y]| Vec3::new(x, y, 0.0)).to_vec();
-        let attributes = Attributes { uvs: Some(corners.map(Vec2::from).to_vec()), ..Attributes::default() };
-        let triangles = vec![[0, 1, 2], [0, 2, 3]];
-        let mesh = Arc::new(Mesh::with_attributes("square", positions, Vec::new(), attributes, triangles).unwrap());
-        // The left half has no holes.
-        let rgba = (0..16).map(|i| [255, 255, 255, if i % 4 < 2 { 255 } else { 0 }]).collect();
-        let texels = Some(Arc::new(Texels { width: 4, height: 4, rgba }));
-        let texture =
-            Texture { texels, wrap: [Wrap::Repeat; 2], factor: Vec3::ONE, alpha_cutoff: Some(0.5), alpha_blend: false };
-        let square = |member: u32, z: f32| {
+        let mesh = Arc::new(square());
+        let texture = half_solid(4, 2);
+        let placed = |member: u32, z: f32| {
             let mesh = &mesh;
             (0..2).map(move |number: u32| {
                 let corners = mesh.triangles[number as usize].map(|v| mesh.positions[v as usize] + z * Vec3::Z);
@@ -435,7 +426,7 @@ mod tests {
         };
         let mask = Mask::new(&mesh, &texture);
         let blockers = Blockers::new(
-            square(0, 1.0).chain(square(1, 2.0)).chain(square(2, 3.0)),
+            placed(0, 1.0).chain(placed(1, 2.0)).chain(placed(2, 3.0)),
             vec![mask.clone(), mask, None],
             Vec::new(),
         );

@@ -5,7 +5,7 @@ use super::sheet::Sheet;
 use super::{Global, output};
 use crate::error::{Result, one_line};
 use crate::field::{FieldKind, ShadowField};
-use crate::sh::basis::{MAX_COEFFICIENTS, coefficient_count, evaluate};
+use crate::sh::basis::{coefficient_count, values};
 use crate::sh::cube;
 use crate::text::{self, number, triple};
 use clap::Args;
@@ -169,8 +169,7 @@ fn unfolded(field: &ShadowField, position: DVec3) -> Vec<[f32; 3]> {
     let texel = |x: usize, y: usize| {
         let Some(face) = UNFOLDED[y / FACE_PX][x / FACE_PX] else { return [f32::NAN; 3] };
         let [s, t] = [x, y].map(|at| cube::texel_st(at % FACE_PX, FACE_PX));
-        let mut basis = [0.0; MAX_COEFFICIENTS];
-        evaluate(bands, cube::direction(face, s, t), &mut basis);
+        let basis = values(bands, cube::direction(face, s, t));
         [0, 1, 2].map(|c: usize| {
             let sum: f64 = found[c.min(channels - 1)].iter().zip(&basis).map(|(c, y)| c * y).sum();
             let value = if field.header.kind == FieldKind::Occlusion { 1.0 - sum } else { sum };

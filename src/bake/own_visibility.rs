@@ -14,7 +14,7 @@ use crate::field::quantity::channel_stride;
 use crate::field::self_visibility::{
     BYTES, LIMIT_RAD, NODES, encode_angle, encode_distance, frame, node_direction, octahedral,
 };
-use crate::sh::basis::{MAX_BANDS, MAX_COEFFICIENTS, coefficient_count, evaluate};
+use crate::sh::basis::{MAX_BANDS, MAX_COEFFICIENTS, coefficient_count, values};
 use crate::sh::lobe::clamped_cosine;
 use crate::sh::rotation::Rotation;
 use glam::{DMat3, DQuat, DVec3, Mat3A, Vec3, Vec3A};
@@ -50,8 +50,7 @@ pub(super) struct PatternRay {
 
 impl PatternRay {
     fn new(local: DVec3, weight: f64) -> Self {
-        let mut basis = [0.0; MAX_COEFFICIENTS];
-        evaluate(MAX_BANDS, local, &mut basis);
+        let basis = values(MAX_BANDS, local);
         PatternRay { local: local.as_vec3a(), weight, share: basis.map(|y| (weight * y) as f32) }
     }
 }
@@ -570,15 +569,13 @@ mod tests {
         ] {
             let seen = under_a_ball(toward, false);
             let mut wanted = [0.0; MAX_COEFFICIENTS];
-            let mut basis = [0.0; MAX_COEFFICIENTS];
             const COUNT: usize = 400_000;
             for direction in lattice(COUNT) {
                 let off = toward.length_squared() - direction.dot(toward).powi(2);
                 let blocked = direction.dot(toward) > 0.0 && off < 1.0;
                 if !blocked && direction.y > 0.0 {
-                    evaluate(4, direction, &mut basis);
                     let weight = 2.0 * TAU * direction.y / COUNT as f64;
-                    wanted.iter_mut().zip(&basis).for_each(|(sum, y)| *sum += weight * y);
+                    wanted.iter_mut().zip(values(4, direction)).for_each(|(sum, y)| *sum += weight * y);
                 }
             }
             let square = |values: &mut dyn Iterator<Item = f64>| values.map(|v| v * v).sum::<f64>().sqrt();

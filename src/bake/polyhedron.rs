@@ -197,7 +197,7 @@ mod tests {
     use super::*;
     use crate::asset::generate;
     use crate::field::silhouette::Side;
-    use crate::sh::basis::{Y00, evaluate};
+    use crate::sh::basis::{Y00, values};
 
     #[test]
     fn a_box_blocks_what_rays_meet() {
@@ -219,8 +219,7 @@ mod tests {
                 let [one, other] = [(-half - eye) / way, (half - eye) / way];
                 let hit = one.min(other).max_element() < one.max(other).min_element().max(0.0);
                 if hit && one.max(other).min_element() > 0.0 {
-                    let mut y = [0.0; POLYGON_COEFFICIENTS];
-                    evaluate(4, way, &mut y);
+                    let y = values(4, way);
                     wanted.iter_mut().zip(y).for_each(|(sum, y)| *sum += y * 4.0 * std::f64::consts::PI / RAYS as f64);
                 }
             }

@@ -10,7 +10,7 @@ use crate::layout::Cluster;
 use crate::lists::incremental::CUT_HEADER;
 use crate::lists::skip::Skip;
 use crate::merge::twin::{Cone, MergeObject};
-use crate::sh::basis::{MAX_COEFFICIENTS, Y00, evaluate};
+use crate::sh::basis::{MAX_COEFFICIENTS, Y00, values};
 use crate::sh::lobe::clamped_cosine;
 use glam::{DVec3, Vec3, Vec4, Vec4Swizzles};
 use rayon::prelude::*;
@@ -271,13 +271,11 @@ impl Movers {
     /// The same from a middle, for any normal: three bands of SH.
     fn far_light(&self, entries: &[u32], of_runs: &[DVec3], middle: DVec3) -> [(DVec3, f64); 9] {
         let mut sums = [(DVec3::ZERO, 0.0); 9];
-        let mut basis = [0.0; MAX_COEFFICIENTS];
         for entry in entries {
             let run = self.seen_run(*entry, middle);
             let square = run.to.length_squared().max(1e-20);
             let share = run.weight * run.height * run.area / (square.sqrt() * (PI * square + run.area));
-            evaluate(3, run.to / square.sqrt(), &mut basis);
-            for ((light, whole), y) in sums.iter_mut().zip(&basis) {
+            for ((light, whole), y) in sums.iter_mut().zip(values(3, run.to / square.sqrt())) {
                 *light += share * y * of_runs[run.number];
                 *whole += share * y;
             }
@@ -342,8 +340,7 @@ fn own_visible(vertex: &TwinVertex<'_>, receiver: &MergeObject<'_>, cone: &Cone,
     }
     let Some(transfer) = vertex.transfer else { return 1.0 };
     let bands = transfer.len().isqrt();
-    let mut basis = [0.0; MAX_COEFFICIENTS];
-    evaluate(bands, direction, &mut basis);
+    let basis = values(bands, direction);
     let seen: f64 = transfer.iter().zip(&basis).map(|(t, y)| f64::from(*t) * y).sum();
     let open: f64 = clamped_cosine(bands, vertex.normal).iter().zip(&basis).map(|(c, y)| c * y).sum();
     (seen / open.max(0.05)).clamp(0.0, 1.0)
@@ -357,8 +354,7 @@ fn seen_from(from: DVec3, bands: usize, blocked: &[f64; MAX_COEFFICIENTS]) -> DV
 
 /// Mean radiosity of those surfaces of a mover that are seen along a direction, which comes from the mover in its frame.
 fn seen(outgoing: &[(DVec3, f64); OUTGOING], direction: DVec3) -> DVec3 {
-    let mut basis = [0.0; MAX_COEFFICIENTS];
-    evaluate(3, direction, &mut basis);
+    let basis = values(3, direction);
     let mut light = DVec3::ZERO;
     let mut area = 0.0;
     for ((of_light, of_area), y) in outgoing.iter().zip(&basis) {

@@ -4,7 +4,7 @@
 use super::brdf;
 use super::lobe::{LEVELS, level_alpha};
 use crate::asset::environment::Environment;
-use crate::sh::basis::{MAX_COEFFICIENTS, evaluate};
+use crate::sh::basis::values;
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 
@@ -157,9 +157,8 @@ impl SkyMap {
 
 fn products(cells: &[Cell]) -> Vec<f32> {
     let mut sums = vec![0.0_f64; 3 * COUNT * COUNT];
-    let mut basis = [0.0; MAX_COEFFICIENTS];
     for cell in cells {
-        evaluate(4, cell.toward, &mut basis);
+        let basis = values(4, cell.toward);
         let light = (cell.solid_angle * cell.radiance).to_array();
         for (of_color, light) in sums.chunks_exact_mut(COUNT * COUNT).zip(light) {
             for (row, y) in of_color.chunks_exact_mut(COUNT).zip(&basis) {

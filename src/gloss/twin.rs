@@ -3,7 +3,7 @@
 use super::lobe::{self, LEVELS, TABLE, TAPS};
 use super::sky_map::{SIDE, SkyMap};
 use super::{LEAST_COSINE, LEAST_HIDDEN, LEAST_SHARE, LEAST_VIEW_Z, MOST_NEARBY, MOST_SHARE, PIXEL_ROUGHNESS, brdf};
-use crate::sh::basis::{MAX_COEFFICIENTS, evaluate};
+use crate::sh::basis::values;
 use crate::sh::lobe::clamped_cosine;
 use glam::DVec3;
 
@@ -88,9 +88,8 @@ impl Twin {
     /// The share of the sky of each colour that gets through, and the factor on light from what stands before it.
     fn seen(&self, vertex: &TwinVertex, taps: &[Tap]) -> (DVec3, f64) {
         let mut lobe = [0.0; COUNT];
-        let mut basis = [0.0; MAX_COEFFICIENTS];
         for tap in taps {
-            evaluate(4, tap.toward, &mut basis);
+            let basis = values(4, tap.toward);
             let weight = tap.weight / tap.toward.dot(vertex.normal).max(LEAST_COSINE);
             for (k, sum) in lobe.iter_mut().enumerate() {
                 let band = k.isqrt();

@@ -5,7 +5,7 @@ use crate::field::visibility_volume::SceneVolume;
 use crate::field::{Area, ShadowField};
 use crate::lists::skip::{CAP_SINES, CAP_SPREAD, CONES_MEET_RAD, SKIP_FADE_RAD, Skip};
 use crate::merge::chain::{ChainState, Multiplier};
-use crate::sh::basis::{MAX_BANDS, MAX_COEFFICIENTS, coefficient_count, evaluate};
+use crate::sh::basis::{MAX_BANDS, MAX_COEFFICIENTS, coefficient_count, values};
 use crate::sh::lobe::clamped_cosine;
 use crate::sh::polygon::POLYGON_BANDS;
 use crate::sh::rotation::Rotation;
@@ -240,8 +240,7 @@ impl Cone {
     pub fn cap(&self, area: f64) -> Cap {
         let (sine, cosine) = self.half_angle_rad.map_or((1.0, 0.0), f64::sin_cos);
         let covered = area * sine * sine;
-        let mut y = [0.0; MAX_COEFFICIENTS];
-        evaluate(MAX_BANDS, self.toward, &mut y);
+        let mut y = values(MAX_BANDS, self.toward);
         for l in 1..MAX_BANDS {
             let band = (1.0 - (l * (l + 1)) as f64 * CAP_SPREAD * covered / 4.0).max(0.0);
             y[l * l..(l + 1) * (l + 1)].iter_mut().for_each(|y| *y *= band);

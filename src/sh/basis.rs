@@ -80,6 +80,13 @@ pub fn evaluate(bands: usize, direction: DVec3, out: &mut [f64]) {
     }
 }
 
+/// Y_lm(`direction`) as [`evaluate`] writes them, and zeros past the last.
+pub fn values(bands: usize, direction: DVec3) -> [f64; MAX_COEFFICIENTS] {
+    let mut out = [0.0; MAX_COEFFICIENTS];
+    evaluate(bands, direction, &mut out);
+    out
+}
+
 /// [`evaluate`] for a number of bands that the compiler knows, so that it unrolls the loops.
 fn evaluate_bands<const BANDS: usize>(direction: DVec3, out: &mut [f64]) {
     let out = &mut out[..coefficient_count(BANDS)];

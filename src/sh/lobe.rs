@@ -4,14 +4,13 @@ use std::f64::consts::PI;
 
 use glam::DVec3;
 
-use super::basis::{MAX_BANDS, MAX_COEFFICIENTS, coefficient_count, evaluate};
+use super::basis::{MAX_BANDS, coefficient_count, values};
 
 /// Turns a function that is symmetric about +z to `axis` (unit): `z[l]` is its coefficient of Y_l0.
 ///
 /// f_lm = sqrt(4 pi / (2l + 1)) z_l Y_lm(axis) (reference 1 of [`crate::sh`]).
 pub fn zonal(bands: usize, z: &[f64], axis: DVec3) -> Vec<f64> {
-    let mut basis = [0.0; MAX_COEFFICIENTS];
-    evaluate(bands, axis, &mut basis);
+    let basis = values(bands, axis);
     let mut coefficients = Vec::with_capacity(coefficient_count(bands));
     for (l, z_l) in z[..bands].iter().enumerate() {
         let scale = (4.0 * PI / (2 * l + 1) as f64).sqrt() * z_l;
@@ -67,9 +66,8 @@ pub fn clamped_cosine(bands: usize, normal: DVec3) -> Vec<f64> {
 pub fn glsl_clamped_cosine(bands: usize) -> String {
     let count = coefficient_count(bands);
     // Along an axis only m = 0 is left, with Y_l0(z) = sqrt((2l + 1) / 4 pi): the band's factor is their quotient.
-    let mut along_z = [0.0; MAX_COEFFICIENTS];
+    let along_z = values(bands, DVec3::Z);
     let lobe = clamped_cosine(bands, DVec3::Z);
-    evaluate(bands, DVec3::Z, &mut along_z);
     let scaled = (0..bands).flat_map(|l| {
         let factor = lobe[l * (l + 1)] / along_z[l * (l + 1)];
         (l * l..(l + 1) * (l + 1)).map(move |k| match factor == 0.0 {

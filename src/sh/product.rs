@@ -3,7 +3,7 @@
 //! `c_k = sum_ij G_ijk a_i b_j` with the Gaunt tensor `G_ijk`, the integral of `Y_i Y_j Y_k` over the sphere: symmetric
 //! in its three indices and mostly zero (353 of 4096 entries at 4 bands).
 
-use super::basis::{MAX_BANDS, MAX_COEFFICIENTS, coefficient_count, evaluate};
+use super::basis::{MAX_BANDS, MAX_COEFFICIENTS, coefficient_count, values};
 use super::quadrature::sphere_rule;
 
 /// Entries below this are zeros with rounding errors. The smallest true magnitudes are 0.0584 at 4 bands and above 1e-4
@@ -46,8 +46,7 @@ impl Tensor {
         let points: Vec<([f64; MAX_COEFFICIENTS], f64)> = sphere_rule(3 * (bands - 1))
             .into_iter()
             .map(|(direction, weight)| {
-                let mut basis = [0.0; MAX_COEFFICIENTS];
-                evaluate(bands, direction, &mut basis);
+                let basis = values(bands, direction);
                 (basis, weight)
             })
             .collect();

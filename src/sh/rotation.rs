@@ -7,7 +7,7 @@ use std::sync::OnceLock;
 
 use glam::{DMat3, DQuat, DVec3};
 
-use super::basis::{MAX_BANDS, MAX_COEFFICIENTS, coefficient_count, evaluate};
+use super::basis::{MAX_BANDS, MAX_COEFFICIENTS, coefficient_count, evaluate, values};
 use super::program::{Program, Term, Value, elements};
 use super::quadrature::{icosahedral_rule, sphere_rule};
 
@@ -26,8 +26,7 @@ impl WeightedBasis {
             sphere_rule(degree)
         };
         let points = rule.into_iter().map(|(point, weight)| {
-            let mut basis = [0.0; MAX_COEFFICIENTS];
-            evaluate(bands, point, &mut basis);
+            let basis = values(bands, point);
             (point, basis.map(|y| weight * y))
         });
         Self { points: points.collect() }

@@ -9,7 +9,7 @@ use super::reflect::{LAMBERT, Reflection};
 use super::sequence::{Axes, COSINE_INTEGRAL, Sequence, cone_solid_angle};
 use super::world::{EntityView, VertexView, World};
 use crate::asset::environment::Environment;
-use crate::sh::basis::{MAX_COEFFICIENTS, evaluate};
+use crate::sh::basis::values;
 use glam::DVec3;
 use rayon::prelude::*;
 
@@ -73,8 +73,7 @@ impl Radiance<'_> {
             Radiance::None => DVec3::ZERO,
             Radiance::Exact(environment) => DVec3::from_array(environment.radiance(direction)),
             Radiance::Bands(bands, coefficients) => {
-                let mut basis = [0.0; MAX_COEFFICIENTS];
-                evaluate(*bands, direction, &mut basis);
+                let basis = values(*bands, direction);
                 let sum = |channel: &Vec<f64>| channel.iter().zip(&basis).map(|(c, y)| c * y).sum();
                 DVec3::from_array(coefficients.each_ref().map(sum))
             }

@@ -22,9 +22,8 @@ fn of_image(file: &Path, scale: f32) -> EnvironmentData {
 /// Slow twin: radiance times basis, summed over a product rule of the given degree.
 fn by_rule(environment: &Environment, bands: usize, degree: usize) -> [Vec<f64>; 3] {
     let mut sum = [(); 3].map(|()| vec![0.0; bands * bands]);
-    let mut values = vec![0.0; bands * bands];
     for (direction, weight) in quadrature::sphere_rule(degree) {
-        basis::evaluate(bands, direction, &mut values);
+        let values = basis::values(bands, direction);
         for (channel, radiance) in sum.iter_mut().zip(environment.radiance(direction)) {
             channel.iter_mut().zip(&values).for_each(|(c, v)| *c += weight * radiance * v);
         }

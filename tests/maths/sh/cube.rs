@@ -4,7 +4,7 @@ use std::f64::consts::PI;
 
 use fastrand::Rng;
 use glam::DVec3;
-use shadow_fields::sh::basis::{coefficient_count, evaluate};
+use shadow_fields::sh::basis::{coefficient_count, values};
 use shadow_fields::sh::cube::{FACE_COUNT, direction, face_basis, face_st, solid_angle, texel_st};
 use shadow_fields::sh::lobe::cap;
 use shadow_fields::sh::project::project;
@@ -106,8 +106,7 @@ fn projection_error(face_px: usize) -> f64 {
     let mut rng = Rng::with_seed(22);
     let coefficients: Vec<f64> = (0..coefficient_count(4)).map(|_| 2.0 * rng.f64() - 1.0).collect();
     let projected = project(4, face_px, |face, x, y| {
-        let mut basis = [0.0; 16];
-        evaluate(4, direction(face, texel_st(x, face_px), texel_st(y, face_px)), &mut basis);
+        let basis = values(4, direction(face, texel_st(x, face_px), texel_st(y, face_px)));
         coefficients.iter().zip(&basis).map(|(c, y)| c * y).sum()
     });
     coefficients.iter().zip(&projected).map(|(c, p)| (c - p).abs()).fold(0.0, f64::max)

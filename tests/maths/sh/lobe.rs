@@ -3,7 +3,7 @@
 use std::f64::consts::PI;
 
 use glam::DVec3;
-use shadow_fields::sh::basis::{MAX_BANDS, coefficient_count, evaluate};
+use shadow_fields::sh::basis::{MAX_BANDS, coefficient_count, values};
 use shadow_fields::sh::lobe::{cap, clamped_cosine, zonal};
 use shadow_fields::sh::quadrature::sphere_rule;
 
@@ -26,16 +26,14 @@ fn assert_close(value: &[f64], expected: &[f64], tolerance: f64, what: &str) {
 fn by_quadrature(axis: DVec3, low: f64, f: impl Fn(f64) -> f64) -> Vec<f64> {
     let (u, v) = axis.any_orthonormal_pair();
     let mut sums = vec![0.0; coefficient_count(MAX_BANDS)];
-    let mut y = sums.clone();
     // The z of a sphere rule are Gauss-Legendre nodes: stretch [-1, 1] to [low, 1].
     for (point, weight) in sphere_rule(24) {
         let height = low + (1.0 - low) * (point.z + 1.0) / 2.0;
         let radius = (1.0 - height * height).sqrt();
         let azimuth = point.y.atan2(point.x);
         let direction = height * axis + radius * (azimuth.cos() * u + azimuth.sin() * v);
-        evaluate(MAX_BANDS, direction.normalize(), &mut y);
         let scale = weight * (1.0 - low) / 2.0 * f(height);
-        sums.iter_mut().zip(&y).for_each(|(sum, y)| *sum += scale * y);
+        sums.iter_mut().zip(values(MAX_BANDS, direction.normalize())).for_each(|(sum, y)| *sum += scale * y);
     }
     sums
 }

@@ -1,7 +1,7 @@
 //! The product tensor: counts, closed forms, quadrature of the pointwise product, the program that is printed as GLSL.
 
 use fastrand::Rng;
-use shadow_fields::sh::basis::{coefficient_count, evaluate};
+use shadow_fields::sh::basis::{coefficient_count, values};
 use shadow_fields::sh::product::Tensor;
 use shadow_fields::sh::product_program::product_program;
 use shadow_fields::sh::quadrature::sphere_rule;
@@ -33,8 +33,7 @@ fn product_equals_quadrature_of_the_pointwise_product() {
         let [a, b] = [(); 2].map(|()| random(&mut rng, bands));
         let mut expected = vec![0.0; coefficient_count(bands)];
         for (direction, weight) in sphere_rule(3 * bands) {
-            let mut y = vec![0.0; 64];
-            evaluate(8, direction, &mut y);
+            let y = values(8, direction);
             let dot = |c: &[f64]| c.iter().zip(&y).map(|(c, y)| c * y).sum::<f64>();
             let value = dot(&a) * dot(&b);
             for (sum, y) in expected.iter_mut().zip(&y) {

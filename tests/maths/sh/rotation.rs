@@ -4,7 +4,7 @@ use std::f64::consts::PI;
 
 use fastrand::Rng;
 use glam::{DQuat, DVec3};
-use shadow_fields::sh::basis::{MAX_BANDS, coefficient_count, evaluate};
+use shadow_fields::sh::basis::{MAX_BANDS, coefficient_count, values};
 use shadow_fields::sh::quadrature::random_direction;
 use shadow_fields::sh::rotation::{Rotation, rotate_program, turns};
 
@@ -23,9 +23,7 @@ fn apply(rotation: &Rotation, coefficients: &[f64]) -> Vec<f64> {
 }
 
 fn value(bands: usize, coefficients: &[f64], direction: DVec3) -> f64 {
-    let mut y = vec![0.0; coefficient_count(bands)];
-    evaluate(bands, direction, &mut y);
-    coefficients.iter().zip(&y).map(|(c, y)| c * y).sum()
+    coefficients.iter().zip(values(bands, direction)).map(|(c, y)| c * y).sum()
 }
 
 /// Block elements are at most 1 and sums at most 15 terms, from f64 tables of 1e-15.

@@ -109,14 +109,10 @@ impl Axes {
         local.x * self.tangent + local.y * self.bitangent + local.z * self.axis
     }
 
-    fn direction(&self, across: DVec2, along: f64) -> DVec3 {
-        across.x * self.tangent + across.y * self.bitangent + along * self.axis
-    }
-
     /// A direction with density cosine / pi on the hemisphere.
     pub fn cosine(&self, point: DVec2) -> DVec3 {
         let across = disk(point);
-        self.direction(across, (1.0 - across.length_squared()).max(0.0).sqrt())
+        self.world(across.extend((1.0 - across.length_squared()).max(0.0).sqrt()))
     }
 
     /// A direction of uniform density in the cone of [`cone_solid_angle`] `height` x 2 pi, height being 1 - cosine: 2
@@ -128,7 +124,7 @@ impl Axes {
         let below = height * share;
         let sine = (below * (2.0 - below)).max(0.0).sqrt();
         let scale = if share > 0.0 { sine / share.sqrt() } else { 0.0 };
-        self.direction(across * scale, 1.0 - below)
+        self.world((across * scale).extend(1.0 - below))
     }
 }
 

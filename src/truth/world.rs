@@ -155,34 +155,28 @@ impl<'s> World<'s> {
         let direction = direction.as_vec3a();
         let placed = &self.entities[sight.entity];
         let limit = (limit_m / placed.radius_m) as f32;
-        if self.lets_through(sight.entity, direction) {
-            return false;
-        }
+        let is_within = |radius: f32| sight.entry(direction, radius).is_some_and(|inner| inner > 0.0 && inner < limit);
+        !self.lets_through(sight.entity, direction)
+            && sight.entry(direction, 1.0).is_some_and(|sphere| sphere < limit)
+            && ((self.scene.mask(sight.entity).is_none() && is_within(placed.mesh.inner_radius))
+                || self.surface_blocks(sight, direction, limit))
+    }
+
+    /// Whether a ray meets the entity's surface, where that is no hole, nearer than `limit` bounding radii.
+    fn surface_blocks(&self, sight: &EntityView, direction: Vec3A, limit: f32) -> bool {
+        let direction = sight.to_object * direction;
         if self.scene.mask(sight.entity).is_some() {
-            let met = self.corners_hit(sight.entity, sight.origin, sight.to_object * direction);
+            let met = self.corners_hit(sight.entity, sight.origin, direction);
             return met.is_some_and(|(distance, ..)| distance < limit);
         }
-        sight.entry(direction, 1.0).is_some_and(|sphere| sphere < limit)
-            && (sight.entry(direction, placed.mesh.inner_radius).is_some_and(|inner| inner > 0.0 && inner < limit)
-                || placed.mesh.blocks(sight.origin, sight.to_object * direction, limit))
+        self.entities[sight.entity].mesh.blocks(sight.origin, direction, limit)
     }
 
     /// Whether the receiver's own mesh blocks a ray (unit direction) nearer than `limit_m` metres.
     pub fn blocks_itself(&self, view: &VertexView, direction: DVec3, limit_m: f64) -> bool {
         view.own.as_ref().is_some_and(|own| {
-            let placed = &self.entities[own.entity];
-            let local = own.to_object * direction.as_vec3a();
-            let limit = (limit_m / placed.radius_m) as f32;
-            let entity = &self.scene.entities[own.entity];
-            if entity.transparent {
-                return false;
-            }
-            match self.scene.mask(own.entity) {
-                Some(_) => {
-                    self.corners_hit(own.entity, own.origin, local).is_some_and(|(distance, ..)| distance < limit)
-                }
-                None => placed.mesh.blocks(own.origin, local, limit),
-            }
+            let limit = (limit_m / own.radius_m) as f32;
+            !self.scene.entities[own.entity].transparent && self.surface_blocks(own, direction.as_vec3a(), limit)
         })
     }
 
@@ -300,11 +294,6 @@ pub struct SurfaceHit {
 }
 
 impl VertexView {
-    /// Whether the receiver can shadow itself.
-    pub fn shadows_itself(&self) -> bool {
-        self.own.is_some()
-    }
-
     /// The receiver itself as seen from just off its surface, where it can shadow itself.
     pub fn own(&self) -> Option<&EntityView> {
         self.own.as_ref()

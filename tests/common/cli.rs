@@ -103,6 +103,11 @@ impl Folder {
         Folder(tempfile::tempdir().unwrap())
     }
 
+    /// One whose name starts so.
+    pub fn named(start: &str) -> Self {
+        Folder(tempfile::Builder::new().prefix(start).tempdir().unwrap())
+    }
+
     /// One within another.
     pub fn inside(outer: &Path) -> Self {
         Folder(tempfile::tempdir_in(outer).unwrap())

@@ -40,7 +40,7 @@ fn dask_runs_slices_in_two_workers() {
         return;
     }
     let Some(farm) = Farm::planned() else { return };
-    let mut submit = farm.command(&["farm", "submit", "p.json", "--engine", "dask", "--workers", "2", "-q"]);
+    let mut submit = farm.command("farm submit p.json --engine dask --workers 2 -q");
     let ran = finish(submit.env("PATH", search_path()));
     assert_eq!(ran.code, 0, "{}", ran.stderr);
     assert!(farm.collected() == whole().files);
@@ -50,10 +50,10 @@ fn dask_runs_slices_in_two_workers() {
 #[test]
 fn a_dask_that_is_missing_says_so_in_a_line() {
     let Some(farm) = Farm::planned() else { return };
-    std::fs::create_dir(farm.path("stub")).unwrap();
-    std::fs::write(farm.path("stub/distributed.py"), "raise ImportError").unwrap();
-    let mut submit = farm.command(&["farm", "submit", "p.json", "--engine", "dask"]);
-    let ran = finish(submit.env("PYTHONPATH", farm.path("stub")));
+    std::fs::create_dir(farm.at("stub")).unwrap();
+    farm.write("stub/distributed.py", "raise ImportError");
+    let mut submit = farm.command("farm submit p.json --engine dask");
+    let ran = finish(submit.env("PYTHONPATH", farm.at("stub")));
     assert_eq!((ran.code, ran.stderr.as_str()), (1, "shadow-fields: dask: python3 has no package distributed\n"));
 }
 
@@ -70,33 +70,31 @@ fn control_characters_in_paths_are_refused_by_plan_and_by_engines() {
             ran.stderr
         );
     };
-    std::fs::create_dir(farm.path("m\n$(touch x)\n")).unwrap();
-    std::fs::copy(farm.path("meshes/a.obj"), farm.path("m\n$(touch x)\n/a.obj")).unwrap();
+    std::fs::create_dir(farm.at("m\n$(touch x)\n")).unwrap();
+    std::fs::copy(farm.at("meshes/a.obj"), farm.at("m\n$(touch x)\n/a.obj")).unwrap();
     for words in [
         &["farm", "plan", "meshes", "-q", "-o", evil][..],
         &["farm", "plan", "meshes", "-q", "-o", "q.json", "--results", evil],
         &["farm", "plan", "m\n$(touch x)\n", "-q", "-o", "q.json"],
         &["farm", "plan", "film.toml", "-q", "-o", "q.json", "--frames", "1", "--pictures", "\n$(touch x)\n#.png"],
     ] {
-        refused(farm.run(words), 2, words);
+        refused(finish(farm.command("").args(words)), 2, words);
     }
-    std::fs::copy(farm.path("p.json"), farm.path(evil)).unwrap();
-    let mut plan = farm.read("p.json");
+    std::fs::copy(farm.at("p.json"), farm.at(evil)).unwrap();
+    let mut plan = farm.plan("p.json");
     plan["results"] = evil.into();
-    std::fs::write(farm.path("inner.json"), plan.to_string()).unwrap();
+    farm.write("inner.json", plan.to_string());
     for engine in [&["local"][..], &["slurm"], &["slurm", "--dry-run"], &["dask"], &["print"], &["openjd"]] {
         let submit = |plan| [&["farm", "submit", plan, "--engine"], engine].concat();
-        refused(farm.run(&submit(evil)), 2, engine);
-        refused(farm.run(&submit("inner.json")), 4, engine);
-        let mut other_cache = Command::new(super::PROGRAM);
-        other_cache.current_dir(farm.folder.path()).args(submit("p.json")).args(["--cache-dir", evil]);
-        refused(finish(&mut other_cache), 2, engine);
+        refused(finish(farm.command("").args(submit(evil))), 2, engine);
+        refused(finish(farm.command("").args(submit("inner.json"))), 4, engine);
+        refused(finish(farm.bare("").args(submit("p.json")).args(["--cache-dir", evil])), 2, engine);
     }
-    assert!(!farm.path("x").exists() && farm.results().is_empty());
+    assert!(!farm.at("x").exists() && farm.results().is_empty());
     // What only one kind of template cannot have.
     for (name, engine) in [("p{{.json", "openjd"), ("p\\.json", "slurm")] {
-        std::fs::copy(farm.path("p.json"), farm.path(name)).unwrap();
-        let ran = farm.run(&["farm", "submit", name, "--engine", engine, "--dry-run"]);
+        std::fs::copy(farm.at("p.json"), farm.at(name)).unwrap();
+        let ran = farm.run(&format!("farm submit {name} --engine {engine} --dry-run"));
         assert!(ran.code == 2 && ran.stderr.contains(" takes no "), "{engine}: {}", ran.stderr);
     }
 }
@@ -104,16 +102,16 @@ fn control_characters_in_paths_are_refused_by_plan_and_by_engines() {
 #[test]
 fn templates_and_commands_are_what_other_farms_take() {
     let Some(farm) = Farm::planned() else { return };
-    let commands = farm.good(&["farm", "submit", "p.json", "--engine", "print"]);
+    let commands = farm.good("farm submit p.json --engine print").stdout;
     assert_eq!(commands.lines().count(), MESHES);
     assert!(Command::new("sh").args(["-c", commands.lines().next().unwrap()]).output().unwrap().status.success());
-    assert!(farm.results().len() == 1 && !farm.path("x").exists());
-    let template = farm.good(&["farm", "submit", "p.json", "--engine", "openjd"]);
+    assert!(farm.results().len() == 1 && !farm.at("x").exists());
+    let template = farm.good("farm submit p.json --engine openjd").stdout;
     let json: Value = serde_json::from_str(&template).unwrap();
     let range = &json["steps"][0]["parameterSpace"]["taskParameterDefinitions"][0]["range"];
     assert_eq!(*range, format!("1-{}", MESHES - 1), "only what is missing");
     if engine("OpenJD", succeeds("openjd", &["--version"]) || succeeds("openjd", &["--help"])) {
-        let path = farm.path("job.template.json");
+        let path = farm.at("job.template.json");
         std::fs::write(&path, template).unwrap();
         assert!(succeeds("openjd", &["check", path.to_str().unwrap()]));
         assert!(succeeds("openjd", &["run", path.to_str().unwrap(), "--step", "Slices", "--task-param", "Slice=1"]));
@@ -159,20 +157,20 @@ fn slurm_runs_an_array_and_requeues_what_dies() {
     let Some(farm) = Farm::planned() else { return };
     let node = SlurmNode(tempfile::tempdir().unwrap());
     assert!(node.script("start"));
-    let submit = ["farm", "submit", "p.json", "--engine", "slurm", "--workers", "2"];
-    let dry = finish(node.on(&mut farm.command(&[&submit[..], &["--dry-run"]].concat())));
+    let submit = "farm submit p.json --engine slurm --workers 2";
+    let dry = finish(node.on(&mut farm.command(&format!("{submit} --dry-run"))));
     assert!(dry.stdout.contains(&format!("--array=0-{}%2 '--output=", MESHES - 1)), "{}", dry.stdout);
-    let ran = finish(node.on(&mut farm.command(&submit)));
+    let ran = finish(node.on(&mut farm.command(submit)));
     assert!(ran.code == 0 && ran.stdout.starts_with("Submitted batch job "), "{} {}", ran.stdout, ran.stderr);
     let job = ran.stdout.trim().rsplit(' ').next().unwrap().to_owned();
     // The first start of slice 0 is killed; Slurm puts it back into the queue.
-    let plan = farm.path("p.json");
+    let plan = farm.at("p.json");
     let words = [plan.to_str().unwrap(), "--no-progress", "--quiet", "--cache-dir", cli::cache().to_str().unwrap()];
     let first = format!("{}\0--slice\x000\0", words.join("\0")).into_bytes();
     let start = std::time::Instant::now();
     let mut killed = false;
     while farm.results().len() < MESHES {
-        assert!(start.elapsed().as_secs() < 200, "{}", farm.good(&["farm", "status", "p.json"]));
+        assert!(start.elapsed().as_secs() < 200, "{}", farm.good("farm status p.json").stdout);
         if let Some(id) = processes(&first).first().filter(|_| !killed) {
             killed = Command::new("kill").args(["-9", &id.to_string()]).status().unwrap().success();
         }
@@ -183,8 +181,8 @@ fn slurm_runs_an_array_and_requeues_what_dies() {
         }
         std::thread::sleep(std::time::Duration::from_millis(50));
     }
-    assert!(killed && !farm.path("x").exists());
+    assert!(killed && !farm.at("x").exists());
     assert!(farm.collected() == whole().files);
-    let log = std::fs::read_to_string(farm.path(&format!("p.logs/{job}_0.log"))).unwrap();
+    let log = std::fs::read_to_string(farm.at(&format!("p.logs/{job}_0.log"))).unwrap();
     assert!(log.contains("start 0") && log.contains("start 1"), "{log}");
 }

@@ -9,13 +9,12 @@ use std::process::Command;
 #[test]
 fn damaged_results_and_slices_that_run_twice_at_once_end_well() {
     let Some(farm) = Farm::planned() else { return };
-    let mut twice: Vec<_> =
-        (0..2).map(|_| farm.command(&["farm", "run", "p.json", "--slice", "0", "-q"]).spawn().unwrap()).collect();
+    let mut twice: Vec<_> = (0..2).map(|_| farm.command("farm run p.json --slice 0 -q").spawn().unwrap()).collect();
     assert!(twice.iter_mut().all(|process| process.wait().unwrap().success()));
     assert_eq!(farm.results().len(), 1);
-    farm.good(&["farm", "submit", "p.json", "--engine", "local"]);
+    farm.good("farm submit p.json --engine local");
     assert!(farm.collected() == whole().files);
-    let plan = Plan::read(&farm.path("p.json")).unwrap();
+    let plan = Plan::read(&farm.at("p.json")).unwrap();
     let results: Vec<_> = (0..MESHES).map(|slice| results::path(&plan, slice)).collect();
     // One byte is turned, one file is cut, one is another slice's, one is gone.
     let bytes: Vec<Vec<u8>> = results.iter().map(|path| std::fs::read(path).unwrap()).collect();
@@ -25,17 +24,17 @@ fn damaged_results_and_slices_that_run_twice_at_once_end_well() {
     std::fs::write(&results[1], &bytes[1][..bytes[1].len() / 2]).unwrap();
     std::fs::write(&results[2], &bytes[3]).unwrap();
     std::fs::remove_file(&results[4]).unwrap();
-    let found = farm.run(&["farm", "collect", "p.json", "--into", "cache", "--json"]);
+    let found = farm.run("farm collect p.json --into cache --json");
     assert_eq!(found.code, 1, "{}", found.stderr);
     let again = format!("4 of {MESHES} slices to run again, missing: 4, damaged: 0-2");
     assert!(found.stderr.contains(&again), "{}", found.stderr);
     let said: Value = serde_json::from_str(&found.stdout).unwrap();
     assert_eq!((&said["missing"], &said["damaged"]), (&json!([4]), &json!([0, 1, 2])));
-    farm.good(&["farm", "submit", "p.json", "--engine", "local"]);
+    farm.good("farm submit p.json --engine local");
     assert!(farm.collected() == whole().files);
     // A slice whose result is damaged does it anew by itself.
     std::fs::write(&results[0], b"not a result").unwrap();
-    let said = farm.good(&["farm", "run", "p.json", "--slice", "0"]);
+    let said = farm.good("farm run p.json --slice 0").stdout;
     assert!(said.contains("done in"), "{said}");
     assert!(farm.collected() == whole().files);
 }
@@ -45,13 +44,13 @@ fn damaged_results_and_slices_that_run_twice_at_once_end_well() {
 #[test]
 fn a_slice_that_cannot_be_written_fails() {
     let Some(farm) = Farm::planned() else { return };
-    let run = farm.command(&["farm", "run", "p.json", "--slice", "0", "-q"]);
+    let run = farm.command("farm run p.json --slice 0 -q");
     let ran = finish(&mut cli::limited(&run, "ulimit -f 4"));
     assert_eq!((ran.code, ran.stdout.as_str()), (1, ""), "{}", ran.stderr);
     // The folder that the slice works in is the first that cannot be written.
     assert!(["cannot be written", "were written"].iter().any(|words| ran.stderr.contains(words)), "{}", ran.stderr);
     assert!(farm.results().is_empty());
-    farm.good(&["farm", "submit", "p.json", "--engine", "local"]);
+    farm.good("farm submit p.json --engine local");
     assert!(farm.collected() == whole().files);
 }
 
@@ -87,12 +86,12 @@ fn kills_lose_at_most_the_slice() {
     let mut killed = 0;
     for kill in 0..kills {
         if kill % 4 == 0 {
-            let _ = std::fs::remove_dir_all(farm.path("results"));
+            let _ = std::fs::remove_dir_all(farm.at("results"));
         }
         let before = farm.results();
         let mut command = match kill % 2 {
-            0 => farm.command(&["farm", "submit", "p.json", "--engine", "local", "--workers", "2", "-q"]),
-            _ => farm.command(&["farm", "run", "p.json", "--slice", &random.usize(0..MESHES).to_string(), "-q"]),
+            0 => farm.command("farm submit p.json --engine local --workers 2 -q"),
+            _ => farm.command(&format!("farm run p.json --slice {} -q", random.usize(0..MESHES))),
         };
         let mut process = command.stdout(std::process::Stdio::null()).spawn().unwrap();
         std::thread::sleep(std::time::Duration::from_millis(random.u64(50..1500)));
@@ -111,20 +110,20 @@ fn kills_lose_at_most_the_slice() {
         process.wait().unwrap();
         // Slices of a submitter that was killed end too.
         let start = std::time::Instant::now();
-        while !processes(farm.folder.path().as_os_str().as_encoded_bytes()).is_empty() {
+        while !processes(farm.path().as_os_str().as_encoded_bytes()).is_empty() {
             assert!(start.elapsed().as_secs() < 60, "slices of a killed submitter end");
             std::thread::sleep(std::time::Duration::from_millis(20));
         }
         let after = farm.results();
         assert!(before.iter().all(|path| after.contains(path)), "nothing is lost");
-        let found = farm.run(&["farm", "collect", "p.json", "--into", "cache", "--json"]);
+        let found = farm.run("farm collect p.json --into cache --json");
         let said: Value = serde_json::from_str(&found.stdout).unwrap();
         assert_eq!(said["damaged"], serde_json::json!([]), "nothing is wrong: {}", found.stderr);
         assert_eq!(said["missing"].as_array().unwrap().len(), MESHES - after.len());
         done += usize::from(found.code == 0);
     }
-    farm.good(&["farm", "submit", "p.json", "--engine", "local"]);
-    let _ = std::fs::remove_dir_all(farm.path("cache"));
+    farm.good("farm submit p.json --engine local");
+    let _ = std::fs::remove_dir_all(farm.at("cache"));
     assert!(farm.collected() == whole().files);
     // What killed slices left is swept by the next that writes to the same folder, and is no result in any case.
     common::report(&format!("{kills} moments, {killed} processes killed, {done} plans whole then"));

@@ -13,16 +13,15 @@ mod engines;
 mod faults;
 mod plans;
 
-use cli::{Ran, finish, has_device};
+use cli::{Folder, Ran, finish, has_device};
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
+use std::ops::Deref;
 use std::path::{Path, PathBuf};
-use std::process::Command;
 use std::sync::OnceLock;
 
-const PROGRAM: &str = env!("CARGO_BIN_EXE_shadow-fields");
 /// Options of bakes that make them short.
-const DRAFT: [&str; 6] = ["--quality", "draft", "--lattice", "cube:4x3", "--face-px", "16"];
+const DRAFT: &str = "--quality draft --lattice cube:4x3 --face-px 16";
 const SCENE: &str = r#"
 camera = { eye = [0, 1, 4], target = [0, 0, 0] }
 environment = { gradient = { radiance = [0.3, 0.35, 0.4] } }
@@ -37,8 +36,14 @@ entity = [
 const MESHES: usize = 6;
 
 /// A folder with meshes and a scene.
-struct Farm {
-    folder: tempfile::TempDir,
+struct Farm(Folder);
+
+impl Deref for Farm {
+    type Target = Folder;
+
+    fn deref(&self) -> &Folder {
+        &self.0
+    }
 }
 
 /// The plan of the meshes, and the cache files that it makes as one slice.
@@ -52,9 +57,9 @@ fn whole() -> &'static Whole {
     static WHOLE: OnceLock<Whole> = OnceLock::new();
     WHOLE.get_or_init(|| {
         let farm = Farm::new();
-        farm.good(&[&["farm", "plan", "meshes", "-o", "p.json"][..], &DRAFT].concat());
-        farm.good(&["farm", "run", "p.json", "--slice", "0"]);
-        Whole { plan: farm.read("p.json"), files: farm.collected() }
+        farm.good(&format!("farm plan meshes -o p.json {DRAFT}"));
+        farm.good("farm run p.json --slice 0");
+        Whole { plan: farm.plan("p.json"), files: farm.collected() }
     })
 }
 
@@ -62,18 +67,17 @@ impl Farm {
     fn new() -> Self {
         // A name that engines have to quote.
         let name = "a farm's \"5%\" $(touch x) `touch x` {command} {slices} {a";
-        let folder = tempfile::Builder::new().prefix(name).tempdir().unwrap();
-        std::fs::create_dir(folder.path().join("meshes")).unwrap();
+        let farm = Farm(Folder::named(name));
+        std::fs::create_dir(farm.at("meshes")).unwrap();
         for index in 0..MESHES {
             let mesh = match index {
                 0 => common::generate::torus(0.6, 0.2, 12, 8),
                 _ => common::generate::sphere(index as f32, 1),
             };
-            let path = folder.path().join(format!("meshes/{}.obj", ["a", "b", "c", "d", "e", "f"][index]));
-            std::fs::write(path, common::obj(&mesh)).unwrap();
+            farm.write(&format!("meshes/{}.obj", ["a", "b", "c", "d", "e", "f"][index]), common::obj(&mesh));
         }
-        std::fs::write(folder.path().join("film.toml"), SCENE).unwrap();
-        Farm { folder }
+        farm.write("film.toml", SCENE);
+        farm
     }
 
     /// `None` where there is no device.
@@ -87,48 +91,22 @@ impl Farm {
         let mut plan = whole().plan.clone();
         let slice = |index| json!({ "meshes": { "first": index, "count": 1 } });
         plan["slices"] = (0..MESHES).map(slice).collect();
-        farm.write(&plan);
+        farm.write("p.json", plan.to_string());
         Some(farm)
     }
 
-    fn path(&self, name: &str) -> PathBuf {
-        self.folder.path().join(name)
-    }
-
-    fn read(&self, plan: &str) -> Value {
-        serde_json::from_slice(&std::fs::read(self.path(plan)).unwrap()).unwrap()
-    }
-
-    /// The program in the folder. Compiled shaders are shared by all tests; what is baked is not.
-    fn command(&self, words: &[&str]) -> Command {
-        let mut command = Command::new(PROGRAM);
-        command.current_dir(self.folder.path()).args(words).arg("--cache-dir").arg(cli::cache());
-        command.env_remove("RUST_LOG").env("NO_COLOR", "1");
-        command
-    }
-
-    fn run(&self, words: &[&str]) -> Ran {
-        finish(&mut self.command(words))
-    }
-
-    fn good(&self, words: &[&str]) -> String {
-        let ran = self.run(words);
-        assert_eq!(ran.code, 0, "{words:?}: {}", ran.stderr);
-        ran.stdout
-    }
-
-    fn write(&self, plan: &Value) {
-        std::fs::write(self.path("p.json"), plan.to_string()).unwrap();
+    fn plan(&self, name: &str) -> Value {
+        serde_json::from_slice(&self.read(name)).unwrap()
     }
 
     fn collected(&self) -> BTreeMap<String, Vec<u8>> {
-        self.good(&["farm", "collect", "p.json", "--into", "cache"]);
-        files(&self.path("cache/fields"))
+        self.good("farm collect p.json --into cache");
+        files(&self.at("cache/fields"))
     }
 
     /// The files of all results. What killed slices left unfinished beside them is none.
     fn results(&self) -> Vec<PathBuf> {
-        let folders = std::fs::read_dir(self.path("results")).into_iter().flatten();
+        let folders = std::fs::read_dir(self.at("results")).into_iter().flatten();
         let files = folders.flat_map(|folder| std::fs::read_dir(folder.unwrap().path()).unwrap());
         let mut files: Vec<PathBuf> = files.map(|file| file.unwrap().path()).collect();
         files.retain(|path| path.extension().is_some_and(|ending| ending == "slice"));
@@ -155,17 +133,16 @@ fn processes(words: &[u8]) -> Vec<u32> {
 #[test]
 fn slices_of_bakes_make_the_bytes_of_a_run_without_a_farm() {
     let Some(farm) = Farm::planned() else { return };
-    let status: Value = serde_json::from_str(&farm.good(&["farm", "status", "p.json", "--json"])).unwrap();
-    assert_eq!(status, json!({ "slices": 6, "done": 0 }));
-    let early = farm.run(&["farm", "collect", "p.json", "--into", "cache"]);
+    assert_eq!(farm.json("farm status p.json"), json!({ "slices": 6, "done": 0 }));
+    let early = farm.run("farm collect p.json --into cache");
     assert_eq!(early.code, 1);
     assert!(early.stderr.contains("6 of 6 slices to run again, missing: 0-5"), "{}", early.stderr);
-    farm.good(&["farm", "submit", "p.json", "--engine", "local", "--workers", "2"]);
-    assert!(farm.good(&["farm", "status", "p.json"]).contains("6 of 6 slices done"));
-    assert!(farm.good(&["farm", "run", "p.json", "--slice", "3"]).contains("there and intact"));
+    farm.good("farm submit p.json --engine local --workers 2");
+    assert!(farm.good("farm status p.json").stdout.contains("6 of 6 slices done"));
+    assert!(farm.good("farm run p.json --slice 3").stdout.contains("there and intact"));
     // What another driver left in the cache is replaced.
     farm.collected();
-    let known: Vec<PathBuf> = whole().files.keys().map(|name| farm.path("cache/fields").join(name)).collect();
+    let known: Vec<PathBuf> = whole().files.keys().map(|name| farm.at("cache/fields").join(name)).collect();
     known.iter().for_each(|path| std::fs::write(path, "another driver's").unwrap());
     let collected = farm.collected();
     // The field and outlines of each mesh, and what is baked of the vertices of the one that is not convex.
@@ -173,13 +150,10 @@ fn slices_of_bakes_make_the_bytes_of_a_run_without_a_farm() {
     assert!(collected == whole().files, "{:?}", collected.keys());
     // The field of `bake` is the same, and a scene finds the fields that it needs. Its own visibility at rest is past all
     // else that rests in the scene, which a farm of meshes does not know.
-    farm.good(&[&["bake", "meshes/a.obj", "-o", "a.sf"][..], &DRAFT].concat());
-    assert!(collected.values().any(|bytes| *bytes == std::fs::read(farm.path("a.sf")).unwrap()), "the field of bake");
-    let mut render = Command::new(PROGRAM);
-    render
-        .args(["render", "film.toml", "-o", "f.png", "--size", "48x32", "--json", "--cache-dir", "cache"])
-        .args(DRAFT);
-    let report: Value = serde_json::from_str(&finish(render.current_dir(farm.folder.path())).stdout).unwrap();
+    farm.good(&format!("bake meshes/a.obj -o a.sf {DRAFT}"));
+    assert!(collected.values().any(|bytes| *bytes == farm.read("a.sf")), "the field of bake");
+    let render = format!("render film.toml -o f.png --size 48x32 --json --cache-dir cache {DRAFT}");
+    let report: Value = serde_json::from_str(&finish(&mut farm.bare(&render)).stdout).unwrap();
     let baked = report["baked"].as_array().unwrap();
     let of_ring = baked.iter().filter(|bake| bake["what"].as_str().unwrap().starts_with("ring"));
     assert_eq!(of_ring.map(|bake| bake["what"].as_str().unwrap()).collect::<Vec<_>>(), ["ring view"]);
@@ -188,23 +162,21 @@ fn slices_of_bakes_make_the_bytes_of_a_run_without_a_farm() {
 #[test]
 fn slices_of_pictures_are_those_of_render() {
     let Some(farm) = Farm::with_device() else { return };
-    std::fs::copy(farm.path("film.toml"), farm.path("other.toml")).unwrap();
-    let options = [&["--size", "48x32", "--variant", "storage", "--time", "0.5"][..], &DRAFT].concat();
+    std::fs::copy(farm.at("film.toml"), farm.at("other.toml")).unwrap();
+    let options = format!("--size 48x32 --variant storage --time 0.5 {DRAFT}");
     let plan = "farm plan film.toml other.toml --frames 5 --pictures out/$_###.png -o p.json --per-slice 3";
-    let said = farm.good(&plan.split(' ').chain(options.iter().copied()).collect::<Vec<_>>());
+    let said = farm.good(&format!("{plan} {options}")).stdout;
     assert!(said.contains("p.json: 4 slices"), "{said}");
     let slice = |film, first, count| json!({ "pictures": { "film": film, "first": first, "count": count } });
-    assert_eq!(farm.read("p.json")["slices"], json!([slice(0, 0, 3), slice(0, 3, 2), slice(1, 0, 3), slice(1, 3, 2)]));
-    farm.good(&["farm", "submit", "p.json", "--engine", "local", "--workers", "1"]);
-    farm.good(&["farm", "collect", "p.json"]);
-    std::fs::create_dir(farm.path("plain")).unwrap();
+    assert_eq!(farm.plan("p.json")["slices"], json!([slice(0, 0, 3), slice(0, 3, 2), slice(1, 0, 3), slice(1, 3, 2)]));
+    farm.good("farm submit p.json --engine local --workers 1");
+    farm.good("farm collect p.json");
+    std::fs::create_dir(farm.at("plain")).unwrap();
     for film in ["film", "other"] {
-        let scene = format!("{film}.toml");
-        let pictures = format!("plain/{film}_###.png");
-        farm.good(&[&["render", &scene, "-o", &pictures, "--frames", "5"][..], &options].concat());
+        farm.good(&format!("render {film}.toml -o plain/{film}_###.png --frames 5 {options}"));
     }
-    let found = files(&farm.path("out"));
-    let plain = files(&farm.path("plain"));
+    let found = files(&farm.at("out"));
+    let plain = files(&farm.at("plain"));
     assert_eq!(found.len(), 10);
     assert!(found.contains_key("film_000.png") && found["film_000.png"] != found["film_004.png"]);
     assert!(found == plain);

@@ -10,12 +10,12 @@ use shadow_fields::{bake, field::file, frame};
 #[test]
 fn other_programs_devices_and_inputs_are_refused_with_both_names() {
     let Some(farm) = Farm::planned() else { return };
-    let good = farm.read("p.json");
+    let good = farm.plan("p.json");
     let refused = |edit: &dyn Fn(&mut Value)| {
         let mut plan = good.clone();
         edit(&mut plan);
-        farm.write(&plan);
-        let ran = farm.run(&["farm", "run", "p.json", "--slice", "0", "-q"]);
+        farm.write("p.json", plan.to_string());
+        let ran = farm.run("farm run p.json --slice 0 -q");
         assert!(farm.results().is_empty());
         (ran.code, ran.stderr)
     };
@@ -37,7 +37,7 @@ fn other_programs_devices_and_inputs_are_refused_with_both_names() {
     let (code, said) = refused(&|plan| plan["device"] = "llvmpipe (Mesa 1.2)".into());
     assert!(code == 3 && said.contains("Mesa 1.2), and this device is "), "{said}");
     // An engine says the same, and tries it once.
-    let ran = farm.run(&["farm", "submit", "p.json", "--engine", "local", "-v"]);
+    let ran = farm.run("farm submit p.json --engine local -v");
     assert!(ran.code == 1 && ran.stderr.contains("and this device is"), "{}", ran.stderr);
     assert!(ran.stderr.contains("slice 0, try 1") && !ran.stderr.contains("try 2"), "{}", ran.stderr);
 }
@@ -45,27 +45,26 @@ fn other_programs_devices_and_inputs_are_refused_with_both_names() {
 #[test]
 fn works_and_options_that_make_no_plan_are_refused_in_a_line() {
     let Some(farm) = Farm::with_device() else { return };
-    std::fs::create_dir(farm.path("other")).unwrap();
-    std::fs::copy(farm.path("film.toml"), farm.path("other/film.toml")).unwrap();
-    std::fs::write(farm.path("notes.txt"), "").unwrap();
-    let film = |words: &[&'static str]| [&["film.toml", "--frames", "2"][..], words].concat();
+    std::fs::create_dir(farm.at("other")).unwrap();
+    std::fs::copy(farm.at("film.toml"), farm.at("other/film.toml")).unwrap();
+    farm.write("notes.txt", "");
     for (words, code, what) in [
-        (vec!["nothing"], 4, "nothing: cannot be read: No such file"),
-        (vec!["notes.txt"], 4, "notes.txt: expected a folder, a mesh"),
-        (vec!["other"], 4, "other: a folder without meshes"),
-        (vec!["film.toml"], 2, "film.toml: a scene needs --frames and --pictures"),
-        (vec!["meshes", "--frames", "2", "--pictures", "o_#.png"], 2, "are for scenes, and there is none"),
-        (film(&["--pictures", "o.png"]), 2, "--pictures o.png: the name needs a run of #"),
-        (film(&["--pictures", "o_#.exr"]), 2, "--pictures o_#.exr: the name must end in .png"),
-        (film(&["other/film.toml", "--pictures", "$_#.png"]), 2, "the names of all scenes have to differ"),
-        (film(&["--pictures", "#.png", "--seed", "2"]), 2, "farm does not take --shader-dir and --seed"),
-        (vec!["meshes", "--shader-dir", "."], 2, "--shader-dir and"),
-        (vec!["meshes", "--size", "9x9"], 2, "are for scenes, and there is none"),
+        ("nothing", 4, "nothing: cannot be read: No such file"),
+        ("notes.txt", 4, "notes.txt: expected a folder, a mesh"),
+        ("other", 4, "other: a folder without meshes"),
+        ("film.toml", 2, "film.toml: a scene needs --frames and --pictures"),
+        ("meshes --frames 2 --pictures o_#.png", 2, "are for scenes, and there is none"),
+        ("film.toml --frames 2 --pictures o.png", 2, "--pictures o.png: the name needs a run of #"),
+        ("film.toml --frames 2 --pictures o_#.exr", 2, "--pictures o_#.exr: the name must end in .png"),
+        ("film.toml --frames 2 other/film.toml --pictures $_#.png", 2, "the names of all scenes have to differ"),
+        ("film.toml --frames 2 --pictures #.png --seed 2", 2, "farm does not take --shader-dir and --seed"),
+        ("meshes --shader-dir .", 2, "--shader-dir and"),
+        ("meshes --size 9x9", 2, "are for scenes, and there is none"),
     ] {
-        let ran = farm.run(&[&["farm", "plan", "-o", "p.json", "-q"], &words[..]].concat());
+        let ran = farm.run(&format!("farm plan -o p.json -q {words}"));
         assert!(ran.code == code && ran.stderr.contains(what), "{words:?}: {} {}", ran.code, ran.stderr);
         assert!(ran.stderr.lines().count() == 1 && !ran.stderr.contains("\\n"), "{words:?}: {}", ran.stderr);
-        assert!(!farm.path("p.json").exists(), "{words:?}");
+        assert!(!farm.at("p.json").exists(), "{words:?}");
     }
 }
 
@@ -73,9 +72,9 @@ fn works_and_options_that_make_no_plan_are_refused_in_a_line() {
 #[test]
 fn equal_meshes_are_planned_once() {
     let Some(farm) = Farm::with_device() else { return };
-    std::fs::copy(farm.path("meshes/b.obj"), farm.path("meshes/c.obj")).unwrap();
-    farm.good(&[&["farm", "plan", "meshes", "-o", "p.json"][..], &DRAFT].concat());
-    let plan = farm.read("p.json");
+    std::fs::copy(farm.at("meshes/b.obj"), farm.at("meshes/c.obj")).unwrap();
+    farm.good(&format!("farm plan meshes -o p.json {DRAFT}"));
+    let plan = farm.plan("p.json");
     let paths: Vec<&str> = plan["meshes"].as_array().unwrap().iter().filter_map(|i| i["path"].as_str()).collect();
     assert_eq!(paths, ["a", "b", "d", "e", "f"].map(|name| format!("meshes/{name}.obj")));
     assert_eq!(plan["slices"][0], json!({ "meshes": { "first": 0, "count": 5 } }));
@@ -85,33 +84,32 @@ fn equal_meshes_are_planned_once() {
 #[test]
 fn a_plan_replaces_no_other_file() {
     let Some(farm) = Farm::with_device() else { return };
-    std::fs::create_dir(farm.path("meshes/more")).unwrap();
+    std::fs::create_dir(farm.at("meshes/more")).unwrap();
     for _ in 0..2 {
-        let ran = farm.run(&[&["farm", "plan", "meshes", "-o", "p.json"][..], &DRAFT].concat());
+        let ran = farm.run(&format!("farm plan meshes -o p.json {DRAFT}"));
         assert!(ran.code == 0 && ran.stdout.starts_with("p.json: 1 slice\n"), "{}{}", ran.stdout, ran.stderr);
         assert!(ran.stderr.contains("note: meshes: 1 folder in it left out"), "{}", ran.stderr);
     }
-    std::fs::write(farm.path("other.json"), "{}").unwrap();
-    std::fs::hard_link(farm.path("meshes/a.obj"), farm.path("a.json")).unwrap();
+    farm.write("other.json", "{}");
+    std::fs::hard_link(farm.at("meshes/a.obj"), farm.at("a.json")).unwrap();
     for (output, words, what) in [
-        ("meshes/a.obj", &[][..], "must end in .json"),
-        ("other.json", &[], "is no plan; --force replaces it"),
-        ("a.json", &["--force"], "the input meshes/a.obj"),
+        ("meshes/a.obj", "", "must end in .json"),
+        ("other.json", "", "is no plan; --force replaces it"),
+        ("a.json", "--force", "the input meshes/a.obj"),
     ] {
-        let before = std::fs::read(farm.path(output)).unwrap();
-        let ran = farm.run(&[&["farm", "plan", "meshes", "-q", "-o", output], words].concat());
+        let before = farm.read(output);
+        let ran = farm.run(&format!("farm plan meshes -q -o {output} {words}"));
         assert!(ran.code == 2 && ran.stderr.contains(what), "{output}: {} {}", ran.code, ran.stderr);
-        assert!(before == std::fs::read(farm.path(output)).unwrap(), "{output}");
+        assert!(before == farm.read(output), "{output}");
     }
-    std::fs::write(farm.path("out_1.png"), "").unwrap();
-    std::fs::hard_link(farm.path("film.toml"), farm.path("f_2.png")).unwrap();
+    farm.write("out_1.png", "");
+    std::fs::hard_link(farm.at("film.toml"), farm.at("f_2.png")).unwrap();
     for (pattern, code) in [("out_#.png", 0), ("f_#.png", 2)] {
-        let ran =
-            farm.run(&["farm", "plan", "film.toml", "-q", "-o", "f.json", "--frames", "3", "--pictures", pattern]);
+        let ran = farm.run(&format!("farm plan film.toml -q -o f.json --frames 3 --pictures {pattern}"));
         assert!(ran.code == code && (code == 0 || ran.stderr.contains("the input film.toml")), "{}", ran.stderr);
     }
-    farm.good(&["farm", "plan", "meshes", "-o", "other.json", "--force"]);
-    assert!(farm.read("other.json")["slices"].is_array());
+    farm.good("farm plan meshes -o other.json --force");
+    assert!(farm.plan("other.json")["slices"].is_array());
 }
 
 /// A plan of two meshes and of two pictures.

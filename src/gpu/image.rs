@@ -3,6 +3,7 @@
 use super::Checked;
 use super::device::Device;
 use super::memory::{Allocation, BufferKind};
+use super::owned::Owned;
 use crate::error::{Error, Result};
 use ash::vk;
 use std::any::Any;
@@ -18,34 +19,12 @@ pub struct ImageShape {
     pub samples: u32,
 }
 
-/// Destroys an image's handles before its memory is freed.
-struct ImageHandle {
-    device: Arc<Device>,
-    image: vk::Image,
-    view: vk::ImageView,
-    /// The swapchain that owns the image, if this handle does not.
-    owner: Option<Arc<dyn Any + Send + Sync>>,
-}
-
-impl Drop for ImageHandle {
-    fn drop(&mut self) {
-        self.device.settle();
-        // SAFETY: recordings that use the image borrow it until they are submitted, and no submission is under way
-        // (settled).
-        unsafe {
-            self.device.handle.destroy_image_view(self.view, None);
-            if self.owner.is_none() {
-                self.device.handle.destroy_image(self.image, None);
-            }
-        }
-    }
-}
-
 /// A two-dimensional image that passes draw into and read.
 pub struct Image {
-    handle: ImageHandle,
-    /// Freed after the handle; `None` for an image of a swapchain.
-    _memory: Option<Allocation>,
+    view: Owned<vk::ImageView>,
+    image: vk::Image,
+    /// Dropped after the view: the swapchain, or the image itself before its memory.
+    _owner: Arc<dyn Any + Send + Sync>,
     levels: u32,
     pub shape: ImageShape,
     pub name: String,
@@ -88,16 +67,15 @@ impl Image {
             .array_layers(1)
             .samples(vk::SampleCountFlags::from_raw(shape.samples))
             .usage(usage);
-        // SAFETY: destroyed by `ImageHandle`.
+        // SAFETY: destroyed by `Owned`.
         let image = unsafe { device.handle.create_image(&create, None) }.checked("vkCreateImage", name)?;
-        let handle = ImageHandle { device: device.clone(), image, view: vk::ImageView::null(), owner: None };
-        device.name(image, name);
+        let own = Owned::new(device, name, image, ash::Device::destroy_image);
         // SAFETY: the handle is alive.
         let needs = unsafe { device.handle.get_image_memory_requirements(image) };
         let memory = Allocation::new(device, name, needs, BufferKind::Device.preferences())?;
         // SAFETY: fresh image and memory of sufficient size.
         unsafe { device.handle.bind_image_memory(image, memory.handle, 0) }.checked("vkBindImageMemory", name)?;
-        Self::with_view(handle, Some(memory), name, shape, levels)
+        Self::with_view(device, name, image, Arc::new((own, memory)), shape, levels)
     }
 
     /// Wraps an image of a swapchain and keeps the swapchain alive.
@@ -110,36 +88,35 @@ impl Image {
     ) -> Result<Self> {
         let name = "window";
         device.name(image, name);
-        let handle = ImageHandle { device: device.clone(), image, view: vk::ImageView::null(), owner: Some(owner) };
-        Self::with_view(handle, None, name, shape, 1)
+        Self::with_view(device, name, image, owner, shape, 1)
     }
 
     fn with_view(
-        mut handle: ImageHandle,
-        memory: Option<Allocation>,
+        device: &Arc<Device>,
         name: &str,
+        image: vk::Image,
+        owner: Arc<dyn Any + Send + Sync>,
         shape: ImageShape,
         levels: u32,
     ) -> Result<Self> {
-        let device = handle.device.clone();
         let view = vk::ImageViewCreateInfo::default()
-            .image(handle.image)
+            .image(image)
             .view_type(vk::ImageViewType::TYPE_2D)
             .format(shape.format)
             .subresource_range(whole(shape.format, levels));
-        // SAFETY: the image is alive and has its memory; the view is destroyed by `ImageHandle`.
-        handle.view = unsafe { device.handle.create_image_view(&view, None) }.checked("vkCreateImageView", name)?;
-        device.name(handle.view, name);
+        // SAFETY: the image is alive and has its memory; the view is destroyed by `Owned`.
+        let view = unsafe { device.handle.create_image_view(&view, None) }.checked("vkCreateImageView", name)?;
+        let view = Owned::new(device, name, view, ash::Device::destroy_image_view);
         let id = device.next_resource.fetch_add(1, Ordering::Relaxed);
-        Ok(Image { handle, _memory: memory, levels, shape, name: name.to_owned(), id })
+        Ok(Image { view, image, _owner: owner, levels, shape, name: name.to_owned(), id })
     }
 
     pub(super) fn raw(&self) -> vk::Image {
-        self.handle.image
+        self.image
     }
 
     pub(super) fn view(&self) -> vk::ImageView {
-        self.handle.view
+        self.view.handle
     }
 
     /// All levels of its one layer.

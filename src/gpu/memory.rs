@@ -1,6 +1,7 @@
 //! Buffers with the memory they own, and texel views of them.
 
 use super::device::Device;
+use super::owned::Owned;
 use super::{Access, Checked, Commands, FLIGHTS};
 use crate::error::{Error, Result};
 use ash::vk;
@@ -82,31 +83,11 @@ impl Drop for Allocation {
     }
 }
 
-/// Destroys a buffer's views and handle before its memory is freed.
-struct BufferHandle {
-    device: Arc<Device>,
-    buffer: vk::Buffer,
-    views: Mutex<Vec<(vk::Format, vk::BufferView)>>,
-}
-
-impl Drop for BufferHandle {
-    fn drop(&mut self) {
-        self.device.settle();
-        let views = self.views.get_mut().unwrap_or_else(|poisoned| poisoned.into_inner());
-        // SAFETY: recordings that use the buffer borrow it until they are submitted, and no submission is under way
-        // (settled).
-        unsafe {
-            for (_, view) in views.drain(..) {
-                self.device.handle.destroy_buffer_view(view, None);
-            }
-            self.device.handle.destroy_buffer(self.buffer, None);
-        }
-    }
-}
-
 /// A buffer with its own memory, usable as storage, uniform, texel, vertex and index buffer and for copies.
 pub struct Buffer {
-    handle: BufferHandle,
+    /// Destroyed before the buffer, which is destroyed before its memory.
+    views: Mutex<Vec<(vk::Format, Owned<vk::BufferView>)>>,
+    handle: Owned<vk::Buffer>,
     memory: Allocation,
     mapped: Option<*mut u8>,
     pub(super) kind: BufferKind,
@@ -135,17 +116,16 @@ impl Buffer {
                 | Use::TRANSFER_SRC
                 | Use::TRANSFER_DST,
         );
-        // SAFETY: destroyed by `BufferHandle`.
-        let handle = unsafe { device.handle.create_buffer(&create, None) }.checked("vkCreateBuffer", name)?;
-        let handle = BufferHandle { device: device.clone(), buffer: handle, views: Mutex::default() };
-        device.name(handle.buffer, name);
+        // SAFETY: destroyed by `Owned`.
+        let buffer = unsafe { device.handle.create_buffer(&create, None) }.checked("vkCreateBuffer", name)?;
+        let handle = Owned::new(device, name, buffer, ash::Device::destroy_buffer);
         // SAFETY: the handle is alive.
-        let needs = unsafe { device.handle.get_buffer_memory_requirements(handle.buffer) };
+        let needs = unsafe { device.handle.get_buffer_memory_requirements(buffer) };
         let memory = Allocation::new(device, name, needs, kind.preferences())?;
         // SAFETY: fresh buffer and memory of sufficient size; the whole allocation is mapped once and unmapped by
         // freeing.
         let mapped = unsafe {
-            device.handle.bind_buffer_memory(handle.buffer, memory.handle, 0).checked("vkBindBufferMemory", name)?;
+            device.handle.bind_buffer_memory(buffer, memory.handle, 0).checked("vkBindBufferMemory", name)?;
             if memory.host_coherent {
                 let pointer = device
                     .handle
@@ -157,7 +137,7 @@ impl Buffer {
             }
         };
         let id = device.next_resource.fetch_add(1, Ordering::Relaxed);
-        Ok(Buffer { handle, memory, mapped, kind, size_bytes, name: name.to_owned(), id })
+        Ok(Buffer { views: Mutex::default(), handle, memory, mapped, kind, size_bytes, name: name.to_owned(), id })
     }
 
     /// A device buffer that holds `data`, copied directly if the host can map device memory, else through a staging
@@ -238,7 +218,7 @@ impl Buffer {
 
     /// The Vulkan handle, which stays the buffer's own.
     pub fn raw(&self) -> vk::Buffer {
-        self.handle.buffer
+        self.handle.handle
     }
 
     pub(super) fn all(&self) -> Range<u64> {
@@ -254,19 +234,21 @@ impl Buffer {
 pub struct Upload {
     buffers: [Buffer; FLIGHTS],
     last: usize,
-    kind: BufferKind,
 }
 
 impl Upload {
     pub fn new(device: &Arc<Device>, name: &str, size_bytes: u64) -> Result<Self> {
-        let one = || Buffer::new(device, name, BufferKind::Upload, size_bytes);
-        Ok(Upload { buffers: [one()?, one()?], last: 0, kind: BufferKind::Upload })
+        Self::of_kind(device, name, BufferKind::Upload, size_bytes)
     }
 
     /// One that the device alone writes and reads, of a size that changes from frame to frame.
     pub fn on_device(device: &Arc<Device>, name: &str, size_bytes: u64) -> Result<Self> {
-        let one = || Buffer::new(device, name, BufferKind::Device, size_bytes);
-        Ok(Upload { buffers: [one()?, one()?], last: 0, kind: BufferKind::Device })
+        Self::of_kind(device, name, BufferKind::Device, size_bytes)
+    }
+
+    fn of_kind(device: &Arc<Device>, name: &str, kind: BufferKind, size_bytes: u64) -> Result<Self> {
+        let one = || Buffer::new(device, name, kind, size_bytes);
+        Ok(Upload { buffers: [one()?, one()?], last: 0 })
     }
 
     /// Writes the whole content.
@@ -283,7 +265,7 @@ impl Upload {
         let buffer = &mut self.buffers[self.last];
         if size_bytes > buffer.size_bytes {
             let size = size_bytes + size_bytes / 2;
-            *buffer = Buffer::new(&buffer.device().clone(), &buffer.name.clone(), self.kind, size)?;
+            *buffer = Buffer::new(&buffer.device().clone(), &buffer.name.clone(), buffer.kind, size)?;
         }
         Ok(())
     }
@@ -328,17 +310,16 @@ impl<'b> TexelView<'b> {
                 buffer.name, buffer.size_bytes, device.limits.max_texel_buffer_elements
             )));
         }
-        let mut views = buffer.handle.views.lock().unwrap_or_else(|poisoned| poisoned.into_inner());
-        if let Some((_, handle)) = views.iter().find(|(known, _)| *known == format) {
-            return Ok(TexelView { handle: *handle, buffer });
+        let mut views = buffer.views.lock().unwrap_or_else(|poisoned| poisoned.into_inner());
+        if let Some((_, view)) = views.iter().find(|(known, _)| *known == format) {
+            return Ok(TexelView { handle: view.handle, buffer });
         }
         let range = buffer.size_bytes / Self::texel_bytes(format) * Self::texel_bytes(format);
         let create = vk::BufferViewCreateInfo::default().buffer(buffer.raw()).format(format).range(range);
         // SAFETY: the buffer is alive and destroys the view before itself.
         let handle =
             unsafe { device.handle.create_buffer_view(&create, None) }.checked("vkCreateBufferView", &buffer.name)?;
-        device.name(handle, &buffer.name);
-        views.push((format, handle));
+        views.push((format, Owned::new(device, &buffer.name, handle, ash::Device::destroy_buffer_view)));
         Ok(TexelView { handle, buffer })
     }
 }

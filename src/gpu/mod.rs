@@ -20,6 +20,7 @@ pub mod image;
 mod instance;
 pub mod loader;
 pub mod memory;
+mod owned;
 pub mod pipeline;
 pub mod process;
 pub mod reflect;

@@ -2,6 +2,7 @@
 
 use super::Checked;
 use super::device::Device;
+use super::owned::Owned;
 use super::reflect::{Binding, Reflection, VertexInput};
 use super::shader::{Shader, Stage};
 use crate::error::{Error, Result};
@@ -10,9 +11,8 @@ use std::sync::Arc;
 
 /// Descriptor set layout and pipeline layout, used by both kinds of pipeline.
 pub(super) struct Layout {
-    device: Arc<Device>,
-    pub(super) set: vk::DescriptorSetLayout,
-    pub(super) pipeline: vk::PipelineLayout,
+    pub(super) pipeline: Owned<vk::PipelineLayout>,
+    pub(super) set: Owned<vk::DescriptorSetLayout>,
     pub(super) bindings: Vec<Binding>,
     pub(super) push_bytes: u32,
     pub(super) push_stages: vk::ShaderStageFlags,
@@ -40,31 +40,25 @@ impl Layout {
             })
             .collect();
         let create = vk::DescriptorSetLayoutCreateInfo::default().bindings(&descriptions);
-        // SAFETY: destroyed in `Drop`.
+        // SAFETY: destroyed by `Owned`.
         let set = unsafe { device.handle.create_descriptor_set_layout(&create, None) }
             .checked("vkCreateDescriptorSetLayout", name)?;
-        let mut layout = Layout {
-            device: device.clone(),
-            set,
-            pipeline: vk::PipelineLayout::null(),
-            bindings,
-            push_bytes: shaders.iter().map(|s| s.reflection.push_bytes).max().unwrap_or(0),
-            push_stages: shaders
-                .iter()
-                .filter(|s| s.reflection.push_bytes > 0)
-                .fold(vk::ShaderStageFlags::empty(), |all, s| all | stage_flag(s.stage)),
-        };
-        let sets = [set];
-        let ranges = [vk::PushConstantRange { stage_flags: layout.push_stages, offset: 0, size: layout.push_bytes }];
+        let set = Owned::new(device, name, set, ash::Device::destroy_descriptor_set_layout);
+        let push_bytes = shaders.iter().map(|s| s.reflection.push_bytes).max().unwrap_or(0);
+        let push_stages = shaders
+            .iter()
+            .filter(|s| s.reflection.push_bytes > 0)
+            .fold(vk::ShaderStageFlags::empty(), |all, s| all | stage_flag(s.stage));
+        let sets = [set.handle];
+        let ranges = [vk::PushConstantRange { stage_flags: push_stages, offset: 0, size: push_bytes }];
         let create = vk::PipelineLayoutCreateInfo::default()
             .set_layouts(&sets)
-            .push_constant_ranges(if layout.push_bytes > 0 { &ranges } else { &[] });
-        // SAFETY: destroyed in `Drop`.
-        layout.pipeline =
+            .push_constant_ranges(if push_bytes > 0 { &ranges } else { &[] });
+        // SAFETY: destroyed by `Owned`.
+        let pipeline =
             unsafe { device.handle.create_pipeline_layout(&create, None) }.checked("vkCreatePipelineLayout", name)?;
-        device.name(set, name);
-        device.name(layout.pipeline, name);
-        Ok(layout)
+        let pipeline = Owned::new(device, name, pipeline, ash::Device::destroy_pipeline_layout);
+        Ok(Layout { pipeline, set, bindings, push_bytes, push_stages })
     }
 }
 
@@ -112,18 +106,6 @@ fn at_most(name: &str, what: &str, asked: u32, most: u32) -> Result<()> {
     Ok(())
 }
 
-impl Drop for Layout {
-    fn drop(&mut self) {
-        self.device.settle();
-        // SAFETY: recordings that use the pipeline borrow it until they are submitted, and no submission is under way
-        // (settled).
-        unsafe {
-            self.device.handle.destroy_pipeline_layout(self.pipeline, None);
-            self.device.handle.destroy_descriptor_set_layout(self.set, None);
-        }
-    }
-}
-
 fn stage_flag(stage: Stage) -> vk::ShaderStageFlags {
     match stage {
         Stage::Compute => vk::ShaderStageFlags::COMPUTE,
@@ -153,20 +135,10 @@ impl Drop for Module<'_> {
     }
 }
 
-/// Destroys a pipeline before its layout.
-struct PipelineHandle(Arc<Device>, vk::Pipeline);
-
-impl Drop for PipelineHandle {
-    fn drop(&mut self) {
-        self.0.settle();
-        // SAFETY: as for its layout.
-        unsafe { self.0.handle.destroy_pipeline(self.1, None) };
-    }
-}
-
 /// One compute shader, ready to dispatch.
 pub struct ComputePipeline {
-    handle: PipelineHandle,
+    /// Before its layout.
+    handle: Owned<vk::Pipeline>,
     pub(super) layout: Layout,
     pub local_size: [u32; 3],
     pub name: String,
@@ -181,17 +153,17 @@ impl ComputePipeline {
             .stage(vk::ShaderStageFlags::COMPUTE)
             .module(module.1)
             .name(c"main");
-        let create = vk::ComputePipelineCreateInfo::default().stage(stage).layout(layout.pipeline);
-        // SAFETY: everything that `create` points to outlives the call; destroyed by `PipelineHandle`.
+        let create = vk::ComputePipelineCreateInfo::default().stage(stage).layout(layout.pipeline.handle);
+        // SAFETY: everything that `create` points to outlives the call; destroyed by `Owned`.
         let handle = unsafe { device.handle.create_compute_pipelines(device.pipeline_cache, &[create], None) }
             .map_err(|(_, code)| code)
             .checked("vkCreateComputePipelines", name)?[0];
-        device.name(handle, name);
-        Ok(ComputePipeline { handle: PipelineHandle(device.clone(), handle), layout, local_size, name: name.into() })
+        let handle = Owned::new(device, name, handle, ash::Device::destroy_pipeline);
+        Ok(ComputePipeline { handle, layout, local_size, name: name.into() })
     }
 
     pub(super) fn raw(&self) -> vk::Pipeline {
-        self.handle.1
+        self.handle.handle
     }
 }
 
@@ -229,7 +201,8 @@ impl GraphicsState {
 /// A vertex and a fragment shader, ready to draw indexed triangles. Vertex input `location` reads tightly packed floats
 /// from the vertex buffer bound at the same number.
 pub struct GraphicsPipeline {
-    handle: PipelineHandle,
+    /// Before its layout.
+    handle: Owned<vk::Pipeline>,
     pub(super) layout: Layout,
     pub(super) inputs: Vec<VertexInput>,
     pub state: GraphicsState,
@@ -289,19 +262,18 @@ impl GraphicsPipeline {
             .depth_stencil_state(&depth)
             .color_blend_state(&blend)
             .dynamic_state(&dynamic)
-            .layout(layout.pipeline)
+            .layout(layout.pipeline.handle)
             .push_next(&mut rendering);
-        // SAFETY: everything that `create` points to outlives the call; destroyed by `PipelineHandle`.
+        // SAFETY: everything that `create` points to outlives the call; destroyed by `Owned`.
         let handle = unsafe { device.handle.create_graphics_pipelines(device.pipeline_cache, &[create], None) }
             .map_err(|(_, code)| code)
             .checked("vkCreateGraphicsPipelines", name)?[0];
-        device.name(handle, name);
-        let handle = PipelineHandle(device.clone(), handle);
+        let handle = Owned::new(device, name, handle, ash::Device::destroy_pipeline);
         Ok(GraphicsPipeline { handle, layout, inputs, state, name: name.into() })
     }
 
     pub(super) fn raw(&self) -> vk::Pipeline {
-        self.handle.1
+        self.handle.handle
     }
 }
 

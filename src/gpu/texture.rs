@@ -6,6 +6,7 @@ use super::commands::{Commands, packed};
 use super::device::Device;
 use super::image::{Image, ImageShape};
 use super::memory::{Buffer, BufferKind};
+use super::owned::Owned;
 use crate::error::Result;
 use ash::vk;
 use std::sync::Arc;
@@ -18,21 +19,9 @@ pub struct Level<'t> {
     pub bytes: &'t [u8],
 }
 
-/// Destroys a sampler, which no submission uses then.
-struct Sampler(Arc<Device>, vk::Sampler);
-
-impl Drop for Sampler {
-    fn drop(&mut self) {
-        self.0.settle();
-        // SAFETY: recordings that use the texture borrow it until they are submitted, and no submission is under way
-        // (settled).
-        unsafe { self.0.handle.destroy_sampler(self.1, None) };
-    }
-}
-
 /// A picture that shaders sample, bilinear and of the nearest level.
 pub struct Texture {
-    sampler: Sampler,
+    sampler: Owned<vk::Sampler>,
     image: Image,
 }
 
@@ -56,9 +45,9 @@ impl Texture {
             .address_mode_u(wrap[0])
             .address_mode_v(wrap[1])
             .max_lod(vk::LOD_CLAMP_NONE);
-        // SAFETY: destroyed by `Sampler`.
+        // SAFETY: destroyed by `Owned`.
         let sampler = unsafe { device.handle.create_sampler(&sampler, None) }.checked("vkCreateSampler", name)?;
-        let sampler = Sampler(device.clone(), sampler);
+        let sampler = Owned::new(device, name, sampler, ash::Device::destroy_sampler);
         let texture = Texture { sampler, image };
         texture.fill(device, name, levels)?;
         Ok(texture)
@@ -87,7 +76,7 @@ impl Texture {
 
     pub(super) fn descriptor(&self) -> vk::DescriptorImageInfo {
         vk::DescriptorImageInfo {
-            sampler: self.sampler.1,
+            sampler: self.sampler.handle,
             image_view: self.image.view(),
             image_layout: Access::GraphicsSampled.layout(),
         }

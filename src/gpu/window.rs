@@ -3,6 +3,7 @@
 use super::device::{Device, DeviceOptions};
 use super::flight::{FLIGHTS, Flight, Signals};
 use super::image::{Image, ImageShape, encodes_srgb};
+use super::owned::Owned;
 use super::{Checked, Commands};
 use crate::error::{Error, Result};
 use ash::{khr, vk};
@@ -94,23 +95,11 @@ impl Drop for WindowSurface {
     }
 }
 
-struct Semaphore(Arc<Device>, vk::Semaphore);
-
-impl Semaphore {
-    fn new(device: &Arc<Device>, name: &str) -> Result<Self> {
-        // SAFETY: destroyed in `Drop`.
-        let handle = unsafe { device.handle.create_semaphore(&vk::SemaphoreCreateInfo::default(), None) }
-            .checked("vkCreateSemaphore", name)?;
-        device.name(handle, name);
-        Ok(Semaphore(device.clone(), handle))
-    }
-}
-
-impl Drop for Semaphore {
-    fn drop(&mut self) {
-        // SAFETY: their owners, `Swapchain` and `Window`, wait for the device first.
-        unsafe { self.0.handle.destroy_semaphore(self.1, None) };
-    }
+fn semaphore(device: &Arc<Device>, name: &str) -> Result<Owned<vk::Semaphore>> {
+    // SAFETY: destroyed by `Owned`.
+    let handle = unsafe { device.handle.create_semaphore(&vk::SemaphoreCreateInfo::default(), None) }
+        .checked("vkCreateSemaphore", name)?;
+    Ok(Owned::new(device, name, handle, ash::Device::destroy_semaphore))
 }
 
 /// Owns a swapchain; its images keep it alive.
@@ -141,7 +130,7 @@ struct Swapchain {
     images: Vec<Arc<Image>>,
     /// Signalled when an image is drawn. There is one per image, because only acquiring the image again shows that its
     /// presentation has taken the semaphore.
-    drawn: Vec<Semaphore>,
+    drawn: Vec<Owned<vk::Semaphore>>,
     handle: Arc<SwapchainHandle>,
 }
 
@@ -167,7 +156,7 @@ pub struct Window {
     chain: Option<Swapchain>,
     /// Signalled when an image may be drawn into. There is one more than flights, since one image may be acquired
     /// ahead.
-    acquired: Vec<Semaphore>,
+    acquired: Vec<Owned<vk::Semaphore>>,
     next: usize,
     format: vk::SurfaceFormatKHR,
     mode: PresentMode,
@@ -202,7 +191,7 @@ impl Window {
                 known.join(", ")
             )));
         }
-        let acquired = (0..=FLIGHTS).map(|_| Semaphore::new(device, "acquired")).collect::<Result<_>>()?;
+        let acquired = (0..=FLIGHTS).map(|_| semaphore(device, "acquired")).collect::<Result<_>>()?;
         Ok(Window {
             device: device.clone(),
             chain: None,
@@ -238,7 +227,7 @@ impl Window {
             }
             let chain = self.chain.as_ref().expect("made above");
             let swapchain = &chain.handle;
-            let semaphore = self.acquired[self.next].1;
+            let semaphore = self.acquired[self.next].handle;
             // SAFETY: the semaphore was waited for by a flight that has ended, since there are more of them than
             // flights.
             match unsafe {
@@ -263,7 +252,7 @@ impl Window {
     pub fn present(&mut self, commands: Commands<'_>, shot: &Shot) -> Result<(Flight, bool)> {
         let chain = self.chain.as_ref().expect("a shot is presented before the window changes");
         assert!(Arc::ptr_eq(&chain.images[shot.index as usize], &shot.image), "a shot of another swapchain");
-        let drawn = chain.drawn[shot.index as usize].1;
+        let drawn = chain.drawn[shot.index as usize].handle;
         let flight = commands.end()?.launch(Signals { wait: Some(shot.acquired), signal: Some(drawn) })?;
         let semaphores = [drawn];
         let swapchains = [chain.handle.handle];
@@ -320,7 +309,7 @@ impl Window {
         let image = |image| Ok(Arc::new(Image::of_swapchain(&self.device, handle.clone(), image, shape)?));
         let images: Vec<_> =
             images.checked("vkGetSwapchainImagesKHR", "window")?.into_iter().map(image).collect::<Result<_>>()?;
-        let drawn = images.iter().map(|_| Semaphore::new(&self.device, "drawn")).collect::<Result<_>>()?;
+        let drawn = images.iter().map(|_| semaphore(&self.device, "drawn")).collect::<Result<_>>()?;
         log::info!("swapchain of {width}x{height}, {} images, {:?}", images.len(), self.format.format);
         self.chain = Some(Swapchain { images, drawn, handle });
         Ok(true)

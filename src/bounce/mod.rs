@@ -370,40 +370,36 @@ impl Bounce {
         let BounceWork { entities, light, steps, .. } = work;
         let quads = vk::Format::R32G32B32A32_SFLOAT;
         let words = vk::Format::R32_UINT;
-        let written = |commands: &mut Commands<'r>| {
-            commands.barrier(Access::ComputeWrite, Access::ComputeRead);
-            commands.barrier(Access::ComputeWrite, Access::ComputeSampled);
-        };
         let vertex_count = self.vertex_count;
         let count = steps.count();
         for step in 0..count {
             let from = if step == 0 { light.direct } else { light.radiosity };
             let resources = [
                 Bind::Buffer(&self.blocks),
-                read(self.texels, &self.areas, words)?,
-                read(self.texels, from, quads)?,
+                Bind::read(self.texels, &self.areas, words)?,
+                Bind::read(self.texels, from, quads)?,
                 Bind::Buffer(&self.run_light),
-                light.lamps.map_or(Ok(Bind::None), |shares| read(self.texels, shares, words))?,
+                light.lamps.map_or(Ok(Bind::None), |shares| Bind::read(self.texels, shares, words))?,
             ];
             commands.dispatch(&self.means, &resources, &(), [CLUSTER_VERTICES * self.block_count, 1, 1])?;
-            written(commands);
+            commands.computed();
             let met = self.movers.as_ref().zip(work.met.as_ref());
             if let Some((movers, (inputs, self_cells))) = met.filter(|_| step == steps.alone) {
                 movers.record(commands, inputs, *self_cells, &self.run_light, count > 1)?;
-                written(commands);
+                commands.computed();
             }
             let mut resources = vec![
-                read(self.texels, entities, quads)?,
-                read(self.texels, &self.ranges, vk::Format::R32G32_UINT)?,
-                read(self.texels, &self.links, vk::Format::R32_UINT)?,
-                read(self.texels, &self.run_light, quads)?,
-                read(self.texels, light.direct, quads)?,
+                Bind::read(self.texels, entities, quads)?,
+                Bind::read(self.texels, &self.ranges, vk::Format::R32G32_UINT)?,
+                Bind::read(self.texels, &self.links, vk::Format::R32_UINT)?,
+                Bind::read(self.texels, &self.run_light, quads)?,
+                Bind::read(self.texels, light.direct, quads)?,
                 Bind::Buffer(light.radiosity),
-                light.soft_direct.map_or(Ok(Bind::None), |light| read(self.texels, light, quads))?,
+                light.soft_direct.map_or(Ok(Bind::None), |light| Bind::read(self.texels, light, quads))?,
                 light.soft.map_or(Bind::None, Bind::Buffer),
             ];
             if let Some(movers) = &self.movers {
-                resources.push(read(self.texels, &movers.incoming, quads)?);
+                resources.push(Bind::read(self.texels, &movers.incoming, quads)?);
             }
             let push = BouncePush {
                 gain: steps.gains[step as usize],
@@ -415,7 +411,7 @@ impl Bounce {
             };
             commands.dispatch(&self.bounce, &resources, &push, [vertex_count, 1, 1])?;
             if step + 1 < count {
-                written(commands);
+                commands.computed();
                 commands.barrier(Access::ComputeWrite, Access::ComputeWrite);
             }
         }
@@ -430,10 +426,6 @@ pub struct BounceWork<'w> {
     pub steps: Steps,
     /// What the merge reads, by [`Bounce::reads`], and the maps of self-visibility where there are any.
     pub met: Option<(MergeInputs<'w>, Option<&'w Buffer>)>,
-}
-
-fn read<'r>(texels: bool, buffer: &'r Buffer, format: vk::Format) -> Result<Bind<'r>> {
-    Ok(if texels { Bind::Texel(TexelView::new(buffer, format)?) } else { Bind::Buffer(buffer) })
 }
 
 pub fn runs_row(texels: bool, soft: bool) -> ShaderPermutation {

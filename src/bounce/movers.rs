@@ -9,11 +9,11 @@
 //!
 //! What moves sees all that rests as flat discs with nothing between: a cut of a tree of runs ([`crate::lists::far`]).
 
-use super::{LinkedEntity, read};
+use super::LinkedEntity;
 use crate::bake::links::{RUN_BITS, RUNS, Runs, WHOLE_SHARE};
 use crate::error::Result;
 use crate::field::self_visibility;
-use crate::gpu::{Access, Bind, Buffer, Commands, ComputePipeline, Device, Upload};
+use crate::gpu::{Bind, Buffer, Commands, ComputePipeline, Device, Upload};
 use crate::layout::CLUSTER_VERTICES;
 use crate::lists::far::{FarRun, FarRuns};
 use crate::lists::incremental::{CUT_HEADER, ClusterLists, Reflectors};
@@ -239,42 +239,38 @@ impl Movers {
         let shared = || -> Result<[Bind<'r>; 4]> {
             Ok([
                 inputs.entities.bind(),
-                read(texels, &self.entries, vk::Format::R32_UINT)?,
-                read(texels, &self.far_data, quads)?,
-                read(texels, run_light, quads)?,
+                Bind::read(texels, &self.entries, vk::Format::R32_UINT)?,
+                Bind::read(texels, &self.far_data, quads)?,
+                Bind::read(texels, run_light, quads)?,
             ])
         };
         let of_outgoing = [Bind::Buffer(&self.movers_data), Bind::Buffer(&self.runs), Bind::Buffer(&self.light)];
         let resources: Vec<Bind<'r>> = shared()?.into_iter().chain(of_outgoing).collect();
         let count = self.surfaces.movers.len() as u32 * MOST_RUNS as u32;
         commands.dispatch(&self.outgoing, &resources, &u32::from(bounced), [count, 1, 1])?;
-        let written = |commands: &mut Commands<'r>| {
-            commands.barrier(Access::ComputeWrite, Access::ComputeRead);
-            commands.barrier(Access::ComputeWrite, Access::ComputeSampled);
-        };
-        written(commands);
+        commands.computed();
         if self.pair_count > 0 {
             let resources = [
                 inputs.entities.bind(),
-                read(texels, &self.entries, vk::Format::R32_UINT)?,
-                read(texels, &self.clusters, vk::Format::R32G32_UINT)?,
+                Bind::read(texels, &self.entries, vk::Format::R32_UINT)?,
+                Bind::read(texels, &self.clusters, vk::Format::R32G32_UINT)?,
                 inputs.fields.bind(),
-                read(texels, &self.light, quads)?,
-                read(texels, &self.pairs, vk::Format::R32G32_UINT)?,
+                Bind::read(texels, &self.light, quads)?,
+                Bind::read(texels, &self.pairs, vk::Format::R32G32_UINT)?,
                 Bind::Buffer(&self.spheres),
             ];
             commands.dispatch(&self.distant, &resources, &self.pair_count, [self.pair_count, 1, 1])?;
-            written(commands);
+            commands.computed();
         }
         let of_movers = [
-            read(texels, &self.clusters, vk::Format::R32G32_UINT)?,
+            Bind::read(texels, &self.clusters, vk::Format::R32G32_UINT)?,
             inputs.fields.bind(),
             inputs.transfers.bind(),
             inputs.vertices.bind(),
-            read(texels, &self.light, quads)?,
+            Bind::read(texels, &self.light, quads)?,
             Bind::Buffer(&self.incoming),
-            self_cells.map_or(Ok(Bind::None), |cells| read(texels, cells, vk::Format::R32G32_UINT))?,
-            read(texels, &self.spheres, quads)?,
+            self_cells.map_or(Ok(Bind::None), |cells| Bind::read(texels, cells, vk::Format::R32G32_UINT))?,
+            Bind::read(texels, &self.spheres, quads)?,
         ];
         let resources: Vec<Bind<'r>> = shared()?.into_iter().chain(of_movers).collect();
         commands.dispatch(&self.movers, &resources, &(), [self.cluster_count * CLUSTER_VERTICES, 1, 1])

@@ -200,9 +200,7 @@ impl Reflections {
 
     /// Computes what every vertex reflects.
     pub fn record<'r>(&'r self, commands: &mut Commands<'r>, inputs: &ReflectionInputs<'r>) -> Result<()> {
-        let read = |buffer: &'r Buffer| -> Result<Bind<'r>> {
-            Ok(if self.texels { Bind::Texel(TexelView::new(buffer, QUAD_FORMAT)?) } else { Bind::Buffer(buffer) })
-        };
+        let read = |buffer: &'r Buffer| Bind::read(self.texels, buffer, QUAD_FORMAT);
         let resources = [
             Bind::Buffer(&self.entities),
             Bind::Buffer(&self.groups),

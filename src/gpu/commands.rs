@@ -139,6 +139,12 @@ impl<'r> Commands<'r> {
         );
     }
 
+    /// Barriers between all that compute shaders wrote and what they read next.
+    pub fn computed(&mut self) {
+        self.barrier(Access::ComputeWrite, Access::ComputeRead);
+        self.barrier(Access::ComputeWrite, Access::ComputeSampled);
+    }
+
     /// As [`Commands::barrier`] for one image, which moves to the layout that `to` needs. With `from` of `None` its
     /// content is discarded.
     pub fn image_barrier(&mut self, image: &'r Image, from: Option<Access>, to: Access) {

@@ -30,6 +30,13 @@ pub enum Bind<'r> {
     None,
 }
 
+impl<'r> Bind<'r> {
+    /// A whole buffer: through a texel view of a format, or as a block.
+    pub fn read(texels: bool, buffer: &'r Buffer, format: vk::Format) -> Result<Self> {
+        Ok(if texels { Bind::Texel(TexelView::new(buffer, format)?) } else { Bind::Buffer(buffer) })
+    }
+}
+
 fn complain(pass: &str, binding: &Binding, what: &str) -> ! {
     panic!("pass {pass}, binding {} ({}): {what}", binding.index, binding.name)
 }

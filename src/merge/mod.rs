@@ -12,7 +12,7 @@ pub mod variant;
 pub mod workload;
 
 use crate::error::Result;
-use crate::gpu::{Bind, Buffer, Commands, ComputePipeline, Device, TexelView};
+use crate::gpu::{Bind, Buffer, Commands, ComputePipeline, Device};
 use crate::layout::CLUSTER_VERTICES;
 use crate::shaders::Library;
 use ash::vk;
@@ -25,10 +25,7 @@ pub struct Readable<'b>(Bind<'b>);
 
 impl<'b> Readable<'b> {
     pub fn new(buffer: &'b Buffer, variant: Variant, format: vk::Format) -> Result<Self> {
-        Ok(Readable(match variant.reads {
-            Reads::Texels => Bind::Texel(TexelView::new(buffer, format)?),
-            Reads::Storage | Reads::StorageUniform => Bind::Buffer(buffer),
-        }))
+        Ok(Readable(Bind::read(variant.reads == Reads::Texels, buffer, format)?))
     }
 
     /// As [`Readable::new`] for what is the same in a whole workgroup, which some variants read as uniform blocks.

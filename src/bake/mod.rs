@@ -251,17 +251,14 @@ impl Baker {
         let offsets = Buffer::with_data(device, "assemble offsets", &sources.offsets)?;
         let list = Buffer::with_data(device, "assemble sources", &sources.list)?;
         let field = Buffer::new(device, "baked field", BufferKind::Device, bytes)?;
-        let payload = Buffer::new(device, "baked payload", BufferKind::Readback, bytes)?;
         let counts = (header.lattice.stored_count(), (header.sample_stride() / 4) as u32);
         let factor = if header.radiance_scale > 0.0 { 1.0 / header.radiance_scale } else { 1.0 };
         let mut commands = Commands::new(device, "assemble")?;
         let inputs = [&captured, &offsets, &list];
         commands.pass("assemble", |c| assemble.record(c, inputs, (&field, 0..bytes), counts, factor))?;
         commands.barrier(Access::ComputeWrite, Access::TransferRead);
-        commands.copy_range(&field, 0..bytes, &payload, 0);
-        commands.barrier(Access::TransferWrite, Access::HostRead);
         report.add(&commands.submit()?);
-        Ok(payload.read(0, bytes as usize))
+        field.download(bytes as usize)
     }
 
     /// The levels of a mesh, which are made when they are first asked for.

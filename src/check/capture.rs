@@ -8,7 +8,7 @@ use crate::bake::capture::{self, Capture, Model, NO_SLOT, Slots};
 use crate::bake::triangles::unit_positions;
 use crate::error::Result;
 use crate::field::FieldKind;
-use crate::gpu::{Access, Buffer, BufferKind, Commands, Device};
+use crate::gpu::{Access, Commands, Device};
 use crate::sh::cube::FACE_COUNT;
 use bytemuck::Pod;
 use glam::{DVec3, Vec3};
@@ -30,15 +30,11 @@ const COLOR: f64 = 1e-4;
 
 /// Captures the faces of a batch and brings the atlas to the host: one `T` a texel.
 pub fn atlas<T: Pod>(device: &Arc<Device>, capture: &Capture, eyes: &[Vec3], slots: &[Slots]) -> Result<Vec<T>> {
-    let texels = u64::from(capture.atlas.shape.width) * u64::from(capture.atlas.shape.height);
-    let buffer = Buffer::new(device, "atlas on the host", BufferKind::Readback, texels * size_of::<T>() as u64)?;
     let drawn = capture.choose(eyes, slots)?;
     let mut commands = Commands::new(device, "capture to host")?;
     capture.record(&mut commands, &drawn, Access::TransferRead)?;
-    commands.copy_image(&capture.atlas, &buffer);
-    commands.barrier(Access::TransferWrite, Access::HostRead);
     commands.submit()?;
-    Ok(buffer.read(0, texels as usize))
+    capture.atlas.download()
 }
 
 /// Place of texel (x, y) of a slot in what [`atlas`] returns.

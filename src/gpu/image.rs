@@ -1,11 +1,12 @@
 //! Images that passes draw into and read, each with the memory it owns.
 
-use super::Checked;
 use super::device::Device;
-use super::memory::{Allocation, BufferKind};
+use super::memory::{Allocation, Buffer, BufferKind};
 use super::owned::Owned;
+use super::{Access, Checked, Commands};
 use crate::error::{Error, Result};
 use ash::vk;
+use bytemuck::Pod;
 use std::any::Any;
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
@@ -109,6 +110,19 @@ impl Image {
         let view = Owned::new(device, name, view, ash::Device::destroy_image_view);
         let id = device.next_resource.fetch_add(1, Ordering::Relaxed);
         Ok(Image { view, image, _owner: owner, levels, shape, name: name.to_owned(), id })
+    }
+
+    /// Copies an image of one sample, whose last access was a [`Access::TransferRead`], to the host in a submission of
+    /// its own: one `T` a texel.
+    pub fn download<T: Pod>(&self) -> Result<Vec<T>> {
+        let device = &self.view.device;
+        let count = self.shape.width as usize * self.shape.height as usize;
+        let staging = Buffer::new(device, "download", BufferKind::Readback, (count * size_of::<T>()) as u64)?;
+        let mut commands = Commands::new(device, "download")?;
+        commands.copy_image(self, &staging);
+        commands.barrier(Access::TransferWrite, Access::HostRead);
+        commands.submit()?;
+        Ok(staging.read(0, count))
     }
 
     pub(super) fn raw(&self) -> vk::Image {

@@ -9,7 +9,7 @@ type Destroy<H> = unsafe fn(&ash::Device, H, Option<&vk::AllocationCallbacks<'_>
 
 /// A Vulkan object, destroyed with its owner once no submission is under way.
 pub(super) struct Owned<H: Copy> {
-    device: Arc<Device>,
+    pub device: Arc<Device>,
     pub handle: H,
     destroy: Destroy<H>,
 }

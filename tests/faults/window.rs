@@ -2,14 +2,13 @@
 
 use shadow_fields::bake::cache::Cache;
 use shadow_fields::draw::{Antialias, Shading};
-use shadow_fields::gpu::{Access, Buffer, BufferKind, Commands, Device, DeviceOptions, Image, ImageShape};
+use shadow_fields::gpu::{Device, DeviceOptions, Image, ImageShape};
 use shadow_fields::scene::{Lights, Scene};
 use shadow_fields::shaders::Library;
 use shadow_fields::view::command::Command;
 use shadow_fields::view::{Editor, FrameTarget, Setup, Viewer};
 use shadow_fields::{Error, Result, bake, check, frame};
 use std::path::Path;
-use std::sync::Arc;
 use std::time::Duration;
 
 const SIZE: [u32; 2] = [48, 32];
@@ -54,10 +53,10 @@ pub fn run(folder: &Path) -> Result<()> {
     if viewer.frame().is_none() {
         return Err(Error::Failed(viewer.message().unwrap_or("no frame, and nothing is said of it").to_owned()));
     }
-    let pixels = look(&device, &image)?;
+    let pixels: Vec<[u8; 4]> = image.download()?;
     drop(viewer);
     device.save_pipeline_cache();
-    std::fs::write(folder.join("w.raw"), pixels).map_err(|error| Error::Failed(error.to_string()))
+    std::fs::write(folder.join("w.raw"), pixels.as_flattened()).map_err(|error| Error::Failed(error.to_string()))
 }
 
 fn frame_options() -> frame::Options {
@@ -70,14 +69,4 @@ fn frame_options() -> frame::Options {
         antialias: Antialias::Outlines,
         ..check::merge::options()
     }
-}
-
-fn look(device: &Arc<Device>, image: &Image) -> Result<Vec<u8>> {
-    let bytes = 4 * SIZE[0] * SIZE[1];
-    let host = Buffer::new(device, "window on the host", BufferKind::Readback, bytes.into())?;
-    let mut commands = Commands::new(device, "look")?;
-    commands.copy_image(image, &host);
-    commands.barrier(Access::TransferWrite, Access::HostRead);
-    commands.submit()?;
-    Ok(host.read(0, bytes as usize))
 }

@@ -6,7 +6,7 @@ use shadow_fields::asset::picture::srgb_from_linear;
 use shadow_fields::bake::Baker;
 use shadow_fields::bake::cache::Cache;
 use shadow_fields::frame::{self, Frame};
-use shadow_fields::gpu::{self, Access, Buffer, BufferKind, Commands, FLIGHTS, Image, ImageShape, Validation};
+use shadow_fields::gpu::{self, FLIGHTS, Image, ImageShape, Validation};
 use shadow_fields::scene::Scene;
 use shadow_fields::view::command::Command;
 use shadow_fields::view::input::{Button, Event, Key};
@@ -20,7 +20,6 @@ pub const FORMAT: ash::vk::Format = ash::vk::Format::R8G8B8A8_SRGB;
 pub struct Stand {
     pub viewer: Viewer,
     image: Image,
-    readback: Buffer,
     pub options: frame::Options,
     pub cache: PathBuf,
     pub gpu: Gpu,
@@ -62,9 +61,7 @@ impl Stand {
         let [width, height] = SIZE;
         let image =
             Image::new(&gpu.device, "window", ImageShape { format: FORMAT, width, height, samples: 1 }).unwrap();
-        let bytes = 4 * u64::from(width) * u64::from(height);
-        let readback = Buffer::new(&gpu.device, "window on the host", BufferKind::Readback, bytes).unwrap();
-        Some(Stand { viewer, image, readback, options, cache, gpu })
+        Some(Stand { viewer, image, options, cache, gpu })
     }
 
     /// One turn of the window's loop.
@@ -95,11 +92,7 @@ impl Stand {
     pub fn shown(&mut self) -> Vec<[u8; 4]> {
         self.turn();
         self.viewer.settle().unwrap();
-        let mut commands = Commands::new(&self.gpu.device, "look").unwrap();
-        commands.copy_image(&self.image, &self.readback);
-        commands.barrier(Access::TransferWrite, Access::HostRead);
-        commands.submit().unwrap();
-        self.readback.read(0, (SIZE[0] * SIZE[1]) as usize)
+        self.image.download().unwrap()
     }
 
     /// The state rendered by a frame of its own, encoded.

@@ -3,8 +3,7 @@
 use super::engines::Call;
 use crate::gpu;
 use std::process::{Command, Output, Stdio};
-use std::sync::Mutex;
-use std::sync::mpsc;
+use std::sync::{Mutex, mpsc};
 
 /// How often a slice is tried.
 const TRIES: usize = 3;

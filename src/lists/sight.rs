@@ -189,8 +189,7 @@ impl Sight {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::asset::generate::teapot;
-    use crate::asset::generate::{cuboid, plane, sphere, torus};
+    use crate::asset::generate::{cuboid, plane, sphere, teapot, torus};
     use crate::bake::chunk::morton;
     use glam::dcamera::rh::{proj::vulkan, view};
 

@@ -2,10 +2,9 @@
 
 use super::data::{Camera, Data, EntityData, MeshData, Output, TextureData, check};
 use super::{Scene, check_counts, read_named, resolve_all};
-use crate::asset::Generator;
-use crate::asset::Mesh;
 use crate::asset::environment::{Environment, EnvironmentData};
 use crate::asset::texture::Texture;
+use crate::asset::{Generator, Mesh};
 use crate::error::{Error, Result};
 use std::sync::Arc;
 

@@ -1,8 +1,7 @@
 //! How a point of a surface reflects light towards the eye: diffusely, and by microfacets where it is glossy.
 
 use super::sequence::Axes;
-use crate::gloss::brdf;
-use crate::gloss::lobe;
+use crate::gloss::{brdf, lobe};
 use crate::scene::Gloss;
 use glam::{DVec2, DVec3};
 use std::f64::consts::{PI, TAU};

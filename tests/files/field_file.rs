@@ -3,10 +3,9 @@
 use crate::common::generate;
 use fastrand::Rng;
 use serde::Serialize;
-use shadow_fields::Error;
-use shadow_fields::bake;
 use shadow_fields::field::file::{self, FIELD_MAGIC, SURFACES_MAGIC};
 use shadow_fields::field::{FieldHeader, FieldKind, Lattice, ShadowField, Storage};
+use shadow_fields::{Error, bake};
 use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
 

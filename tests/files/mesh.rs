@@ -6,8 +6,7 @@ use std::path::Path;
 
 use generate::{cuboid, plane, sphere, torus, torus_two_colour};
 use glam::{DVec3, Quat, Vec2, Vec3};
-use shadow_fields::asset::Generator;
-use shadow_fields::asset::{Mesh, embedded, enclose};
+use shadow_fields::asset::{Generator, Mesh, embedded, enclose};
 
 /// f32 positions: a few roundings of 6e-8 each, summed over many triangles of either sign.
 const F32: f64 = 1e-6;

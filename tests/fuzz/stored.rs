@@ -4,12 +4,11 @@ use super::common::generate;
 use super::targets::{NAME, bordered, sealed, with_file};
 use glam::DVec3;
 use serde::de::DeserializeOwned;
-use shadow_fields::Result;
-use shadow_fields::bake;
 use shadow_fields::error::Error;
 use shadow_fields::field::file::{self, FIELD_MAGIC};
 use shadow_fields::field::silhouette::{SILHOUETTE_MAGIC, SilhouetteField, SilhouetteHeader};
 use shadow_fields::field::{FieldKind, ShadowField, Storage};
+use shadow_fields::{Result, bake};
 use std::path::Path;
 
 /// The file that `write` writes, with a zero byte between header and payload so that [`sealed`] finds the border.

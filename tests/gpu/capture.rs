@@ -2,8 +2,7 @@
 //! faces.
 
 use crate::common;
-use common::generate;
-use common::{Gpu, gpu};
+use common::{Gpu, generate, gpu};
 use glam::{Quat, Vec3};
 use shadow_fields::asset::Mesh;
 use shadow_fields::bake::capture::{Capture, Model, NO_SLOT, Way};

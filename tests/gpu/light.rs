@@ -2,10 +2,9 @@
 
 use crate::stage;
 use glam::{DVec3, Quat, Vec3};
-use shadow_fields::bake;
-use shadow_fields::frame;
 use shadow_fields::lists::skip::Skip;
 use shadow_fields::scene::{Placement, Scene};
+use shadow_fields::{bake, frame};
 use stage::{at, difference, scene, small, stage};
 
 /// A denser lattice for comparisons with closed forms, f32. Faces are fine, because a walk along a row of samples meets

@@ -2,8 +2,7 @@
 
 use crate::{common, stage};
 use common::report;
-use shadow_fields::asset::Generator;
-use shadow_fields::asset::embedded;
+use shadow_fields::asset::{Generator, embedded};
 use shadow_fields::bake::Baker;
 use shadow_fields::bake::silhouette::SilhouetteOptions;
 use shadow_fields::check::merge::{ARITHMETIC, MIXED, against_twin};

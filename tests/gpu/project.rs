@@ -1,8 +1,7 @@
 //! Projection on the device against its twin in f64, and what samples stand for.
 
 use crate::common;
-use common::generate;
-use common::{gpu, report};
+use common::{generate, gpu, report};
 use glam::Vec3;
 use shadow_fields::asset::Mesh;
 use shadow_fields::bake::assemble::{Source, Sources, twin};

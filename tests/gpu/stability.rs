@@ -1,12 +1,10 @@
 //! Odd places, sizes, numbers and meshes: everything finite, bounded, the same on a second run, and near its f64 twin.
 
 use crate::stage;
-use shadow_fields::bake;
 use shadow_fields::bench::stability::{cases, trial};
-use shadow_fields::check;
 use shadow_fields::field::Storage;
-use shadow_fields::frame;
 use shadow_fields::lists::skip::Skip;
+use shadow_fields::{bake, check, frame};
 use stage::{small, stage};
 
 #[test]

@@ -6,11 +6,10 @@ use shadow_fields::asset::Mesh;
 use shadow_fields::asset::environment::EnvironmentData;
 use shadow_fields::asset::mesh::Attributes;
 use shadow_fields::asset::texture::{Texels, Texture, Wrap};
-use shadow_fields::bake;
 use shadow_fields::draw::Antialias;
-use shadow_fields::frame;
 use shadow_fields::scene::data::EntityData;
 use shadow_fields::scene::{Albedo, Scene};
+use shadow_fields::{bake, frame};
 use stage::{difference, scene, small, stage};
 use std::sync::Arc;
 

@@ -54,10 +54,9 @@ use crate::asset::mesh::Attributes;
 use crate::asset::texture::{Texels, Texture};
 use crate::error::{Error, Result};
 use crate::scene::data::{Albedo, Data, EntityData, MeshData, Output, PoseData, TextureData};
-use crate::scene::framing;
 use crate::scene::motion::RotationData;
 use crate::scene::values::{POSITION_LIMIT_M, SCALE_LIMIT};
-use crate::scene::{ENTITY_LIMIT, MESH_LIMIT, Maps, Surroundings, check_counts};
+use crate::scene::{ENTITY_LIMIT, MESH_LIMIT, Maps, Surroundings, check_counts, framing};
 use animation::Tracks;
 use document::Document;
 #[cfg(feature = "cli")]

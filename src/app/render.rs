@@ -13,7 +13,7 @@ use crate::gpu::Timing;
 use crate::scene::{self, Placement, Scene, light, values::NUMBER_LIMIT};
 use crate::text::{self, number};
 use crate::truth::pixels::{self, RayPicture};
-use crate::truth::{self, ErrorMap, RayMeshes, World, error_map, raycast::RayCast};
+use crate::truth::{self, ErrorMap, World, error_map, raycast::RayCast};
 use clap::Args;
 use serde_json::{Value, json};
 use std::fmt::Write;
@@ -239,8 +239,7 @@ impl<'a> Rendering<'a> {
 
     /// One picture by rays.
     fn cast(&self, placements: &[Placement]) -> RayPicture {
-        let shapes = RayMeshes::new(self.scene);
-        let world = World::new(self.scene, &shapes, placements);
+        let world = World::of(self.scene, placements);
         let cast = self.rays();
         let [_, height] = self.options.size;
         let tell = |rows: u32| self.context.progress.rows(rows, height);

@@ -10,7 +10,7 @@ use crate::frame::Frame;
 use crate::truth::pixels::lit_points;
 use crate::truth::raycast::relative_error;
 use crate::truth::world::VertexView;
-use crate::truth::{RayCast, RayMeshes, Vertex, World, receiver_vertices, sample_vertices};
+use crate::truth::{RayCast, Vertex, World, receiver_vertices, sample_vertices};
 use serde::Serialize;
 
 /// Size of the pictures that are compared with ray-cast pixels: each of them costs what a vertex does.
@@ -63,8 +63,7 @@ impl Judged {
     /// Vertices of a case. Their truth does not depend on options of bake or merge; an error where no light reaches any
     /// of them.
     pub fn vertices_of(bench: &Bench<'_>, case: &Case) -> Result<Self> {
-        let shapes = RayMeshes::new(&case.scene);
-        let world = World::new(&case.scene, &shapes, &case.scene.at(case.time_s));
+        let world = World::of(&case.scene, &case.scene.at(case.time_s));
         let (count, cast) = effort(bench, case);
         let judged = Self::vertices(&world, count, &cast);
         if judged.is_lit() {

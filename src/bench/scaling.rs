@@ -8,7 +8,7 @@ use crate::error::{Error, Result};
 use crate::frame::{self, Frame};
 use crate::lists::skip::Skip;
 use crate::scene::Placement;
-use crate::truth::{RayCast, RayMeshes, World};
+use crate::truth::{RayCast, World};
 use serde::Serialize;
 use std::time::Instant;
 
@@ -82,8 +82,7 @@ fn axes(quick: bool) -> Vec<(&'static str, Vec<Town>)> {
 /// Relative root mean square error of a sample of vertices against ray casting.
 fn error(bench: &Bench<'_>, frame: &mut Frame, placements: &[Placement]) -> Result<f64> {
     let scene = frame.scene().clone();
-    let shapes = RayMeshes::new(&scene);
-    let world = World::new(&scene, &shapes, placements);
+    let world = World::of(&scene, placements);
     let cast = RayCast { rays: if bench.quick { 256 } else { 1024 }, seed: bench.seed, ..Default::default() };
     let judged = Judged::vertices(&world, if bench.quick { 64 } else { 256 }, &cast);
     frame.render(placements, None)?;

@@ -10,7 +10,7 @@ use crate::error::Result;
 use crate::frame::{self, Frame};
 use crate::lists::skip::{EPS, Skip, SkipRow, TABLE};
 use crate::scene::{Placement, Scene};
-use crate::truth::{RayCast, RayMeshes, World};
+use crate::truth::{RayCast, World};
 use serde::Serialize;
 use std::time::Instant;
 
@@ -81,8 +81,7 @@ pub fn all(quick: bool) -> Result<Vec<Case>> {
 fn of_case(bench: &Bench<'_>, case: &Case) -> Result<Vec<SkipCost>> {
     (bench.progress)(&format!("{}: casting rays", case.name));
     let placements = case.scene.at(case.time_s);
-    let shapes = RayMeshes::new(&case.scene);
-    let world = World::new(&case.scene, &shapes, &placements);
+    let world = World::of(&case.scene, &placements);
     let rays = if bench.quick { 512 } else { 4096 };
     let cast = RayCast { rays, seed: bench.seed, distant: case.distant, ..Default::default() };
     let judged = Judged::vertices(&world, if bench.quick { 500 } else { 1500 }, &cast);

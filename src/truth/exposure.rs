@@ -3,7 +3,7 @@
 
 use super::pixels::Eye;
 use super::raycast::RayCast;
-use super::{RayMeshes, Vertex, World};
+use super::{Vertex, World};
 use crate::scene::Scene;
 
 /// Pixels along the longer side of the picture that is metered.
@@ -37,8 +37,7 @@ pub fn settle(scene: &mut Scene, time_s: f64, aspect: f64) -> Option<String> {
 /// at `time_s`; `None` where all of that is black. Emission counts only where nothing else is seen.
 pub fn exposure_ev(scene: &Scene, time_s: f64, aspect: f64) -> Option<f32> {
     let size = [SIZE_PX * aspect.min(1.0), SIZE_PX / aspect.max(1.0)].map(|px| (px.round() as u32).max(1));
-    let shapes = RayMeshes::new(scene);
-    let world = World::new(scene, &shapes, &scene.at(time_s));
+    let world = World::of(scene, &scene.at(time_s));
     let eye = Eye::new(&world, size);
     let seen: Vec<_> =
         (0..size[0] * size[1]).filter_map(|pixel| Some((pixel, eye.seen(pixel, [0.5; 2]).pop()?))).collect();

@@ -76,8 +76,7 @@ pub fn by_entity(vertices: &[Vertex], lit: &[Estimate]) -> Vec<EntityRadiosity> 
 /// T0 of a whole scene, for pictures: radiosity of every receiver's vertices by entity, as `Frame::set_radiosity` takes
 /// it, and the root mean square of its standard error relative to that of the radiosity.
 pub fn picture(scene: &Scene, placements: &[Placement], cast: &RayCast) -> (Vec<EntityRadiosity>, f64) {
-    let shapes = RayMeshes::new(scene);
-    let world = World::new(scene, &shapes, placements);
+    let world = World::of(scene, placements);
     let vertices = receiver_vertices(scene);
     let lit = cast.run(&world, &vertices);
     (by_entity(&vertices, &lit), raycast::relative_error(&lit))

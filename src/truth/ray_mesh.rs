@@ -12,6 +12,7 @@ use obvhs::cwbvh::{CwBvh, builder::build_cwbvh_from_tris};
 use obvhs::ray::{Ray, RayHit};
 use obvhs::triangle::Triangle;
 use rayon::prelude::*;
+use std::sync::Arc;
 use std::time::Duration;
 
 /// Lengths in a hierarchy over bounding radii. [`CwBvh`] leaves out every box that a ray has left 1e-4 after its start:
@@ -35,12 +36,12 @@ pub struct RayMesh {
 }
 
 /// The meshes of a scene, in its order.
-pub struct RayMeshes(pub Vec<RayMesh>);
+pub struct RayMeshes(pub Vec<Arc<RayMesh>>);
 
 impl RayMeshes {
     /// Builds every hierarchy, which takes milliseconds per mesh.
     pub fn new(scene: &Scene) -> Self {
-        RayMeshes(scene.meshes.par_iter().map(|mesh| RayMesh::new(mesh)).collect())
+        RayMeshes(scene.meshes.par_iter().map(|mesh| Arc::new(RayMesh::new(mesh))).collect())
     }
 }
 

@@ -14,8 +14,8 @@ use std::sync::Arc;
 /// Holes that a ray passes at most.
 const MOST_HOLES: usize = 32;
 
-pub struct PlacedEntity<'s> {
-    pub mesh: &'s RayMesh,
+pub struct PlacedEntity {
+    pub mesh: Arc<RayMesh>,
     /// Centre of the bounding sphere, metres.
     pub centre: DVec3,
     pub radius_m: f64,
@@ -27,7 +27,7 @@ pub struct PlacedEntity<'s> {
 pub struct World<'s> {
     /// The scene without placements.
     pub scene: &'s Scene,
-    pub entities: Vec<PlacedEntity<'s>>,
+    pub entities: Vec<PlacedEntity>,
     /// Entities that occlude.
     pub occluders: Vec<usize>,
     /// Entities that emit.
@@ -68,13 +68,18 @@ pub struct BoundingCone {
 }
 
 impl<'s> World<'s> {
-    /// The scene with its entities at `placements`.
-    pub fn new(scene: &'s Scene, meshes: &'s RayMeshes, placements: &[Placement]) -> Self {
+    /// The scene with its entities at `placements`, prepared for rays, which takes milliseconds per mesh.
+    pub fn of(scene: &'s Scene, placements: &[Placement]) -> Self {
+        Self::new(scene, &RayMeshes::new(scene), placements)
+    }
+
+    /// The same of meshes that are prepared.
+    pub fn new(scene: &'s Scene, meshes: &RayMeshes, placements: &[Placement]) -> Self {
         let placed = |(entity, placement): (&crate::scene::Entity, &Placement)| {
             let (centre, radius_m) = placement.sphere(scene.meshes[entity.mesh].bounding_sphere());
             let rotation = placement.turn();
             PlacedEntity {
-                mesh: &meshes.0[entity.mesh],
+                mesh: meshes.0[entity.mesh].clone(),
                 centre,
                 radius_m,
                 rotation,
@@ -192,7 +197,7 @@ impl<'s> World<'s> {
     /// The first place of an entity, no hole, that a ray of its own frame meets: the distance, the triangle and the
     /// weights of its corners.
     fn corners_hit(&self, entity: usize, origin: Vec3A, direction: Vec3A) -> Option<(f32, usize, [f32; 3])> {
-        let shape = self.entities[entity].mesh;
+        let shape = &self.entities[entity].mesh;
         let mesh = &self.scene.meshes[self.scene.entities[entity].mesh];
         let mask = self.scene.mask(entity);
         let mut passed = 0.0;
@@ -267,7 +272,7 @@ impl<'s> World<'s> {
     pub fn emission(&self, sight: &EntityView, direction: DVec3) -> Option<DVec3> {
         let direction = direction.as_vec3a();
         sight.entry(direction, 1.0)?;
-        let mesh = self.entities[sight.entity].mesh;
+        let mesh = &self.entities[sight.entity].mesh;
         if mesh.is_plain() && sight.entry(direction, mesh.inner_radius).is_some_and(|inner| inner > 0.0) {
             return Some(DVec3::ONE);
         }

@@ -9,7 +9,7 @@ use crate::asset::false_color::NEUTRAL;
 use crate::error::Result;
 use crate::scene::{Placement, Scene};
 use crate::truth::error_map::{self, ErrorMap};
-use crate::truth::{EntityRadiosity, RayCast, RayMeshes, World, by_entity, raycast, receiver_vertices};
+use crate::truth::{EntityRadiosity, RayCast, World, by_entity, raycast, receiver_vertices};
 
 /// Rays per vertex and light in each round; a round does not reuse the previous one.
 const ROUNDS: [u32; 3] = [32, 256, 2048];
@@ -82,8 +82,7 @@ impl Viewer {
 
 fn cast(scene: Scene, placements: Vec<Placement>, version: u64, seed: u64) -> BackgroundTask<Reference> {
     BackgroundTask::new(move |worker: &TaskWorker<Reference>| {
-        let shapes = RayMeshes::new(&scene);
-        let world = World::new(&scene, &shapes, &placements);
+        let world = World::of(&scene, &placements);
         for rays in ROUNDS {
             let rays = RayCast { rays, runs: RUNS, seed, ..RayCast::default() };
             worker.send(round(&scene, &world, rays, version, worker)?);

@@ -6,7 +6,7 @@ use shadow_fields::bake::{self, Quality};
 use shadow_fields::check::merge::ROOM;
 use shadow_fields::frame;
 use shadow_fields::scene::{Lights, Scene};
-use shadow_fields::truth::{RayCast, RayMeshes, Vertex, World};
+use shadow_fields::truth::{RayCast, Vertex, World};
 use stage::{Stage, scene, small, stage};
 
 /// The fields that the command line bakes by default, in f32, of meshes as they are.
@@ -17,8 +17,7 @@ fn defaults(lights: Lights) -> frame::Options {
 
 /// Vertices of an entity as rays light them.
 fn truth(scene: &Scene, time_s: f64, entity: usize, every: usize, rays: u32) -> (Vec<usize>, Vec<f64>) {
-    let shapes = RayMeshes::new(scene);
-    let world = World::new(scene, &shapes, &scene.at(time_s));
+    let world = World::of(scene, &scene.at(time_s));
     let count = scene.meshes[scene.entities[entity].mesh].positions.len();
     let chosen: Vec<usize> = (0..count).step_by(every).collect();
     let vertices: Vec<Vertex> = chosen.iter().map(|&index| Vertex { entity, index }).collect();

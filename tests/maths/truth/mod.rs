@@ -5,9 +5,8 @@ mod order;
 use crate::common::generate;
 use glam::{DVec3, Vec3};
 use shadow_fields::scene::Scene;
-use shadow_fields::truth::pixels;
 use shadow_fields::truth::raycast::{Distant, RayCast, relative_error};
-use shadow_fields::truth::{RayMeshes, Vertex, World, receiver_vertices, sample_vertices};
+use shadow_fields::truth::{Vertex, World, pixels, receiver_vertices, sample_vertices};
 use std::path::Path;
 
 /// A ball of radius 0.5 m, 1 m above a floor of 81 vertices and albedo 0.6.
@@ -66,8 +65,7 @@ fn taken(position: DVec3) -> f64 {
 #[test]
 fn a_ball_under_a_uniform_sky_takes_its_closed_form() {
     let scene = scene(&format!("{BALL}{SKY}"));
-    let shapes = RayMeshes::new(&scene);
-    let mut world = World::new(&scene, &shapes, &scene.at(0.0));
+    let mut world = World::of(&scene, &scene.at(0.0));
     let (vertices, positions): (Vec<_>, Vec<_>) = floor_positions(&scene).into_iter().unzip();
     let lit = RayCast::default().run(&world, &vertices);
     for (position, estimate) in positions.iter().zip(&lit) {
@@ -90,8 +88,7 @@ fn a_sphere_light_shines_as_its_closed_form_and_is_hidden_by_what_is_nearer() {
     let light =
         "[[entity]]\nmesh = \"ball\"\nposition = [0, 2.5, 0]\nscale = 0.4\nemission = [9, 9, 9]\nreceives = false\n";
     let open = scene(light);
-    let shapes = RayMeshes::new(&open);
-    let world = World::new(&open, &shapes, &open.at(0.0));
+    let world = World::of(&open, &open.at(0.0));
     let (vertices, positions): (Vec<_>, Vec<_>) = floor_positions(&open).into_iter().unzip();
     let lit = RayCast::default().run(&world, &vertices);
     for (position, estimate) in positions.iter().zip(&lit) {
@@ -106,13 +103,12 @@ fn a_sphere_light_shines_as_its_closed_form_and_is_hidden_by_what_is_nearer() {
     }
     // Below the ball the light is wholly hidden; from above it, not.
     let hidden = scene(&format!("{BALL}{light}"));
-    let shapes = RayMeshes::new(&hidden);
     let centre = Vertex { entity: 0, index: positions.iter().position(|p| p.length() < 1e-6).unwrap() };
-    let dark = RayCast::default().run(&World::new(&hidden, &shapes, &hidden.at(0.0)), &[centre]);
+    let dark = RayCast::default().run(&World::of(&hidden, &hidden.at(0.0)), &[centre]);
     assert_eq!(dark[0].radiosity, [0.0; 3]);
     let mut swapped = hidden.at(0.0);
     (swapped[1].position, swapped[2].position) = (Vec3::new(0.0, 2.5, 0.0), Vec3::new(0.0, 1.0, 0.0));
-    let bright = RayCast::default().run(&World::new(&hidden, &shapes, &swapped), &[centre]);
+    let bright = RayCast::default().run(&World::of(&hidden, &swapped), &[centre]);
     assert!(bright[0].radiosity[0] > 0.1, "{bright:?}");
 }
 
@@ -130,12 +126,8 @@ fn a_receiver_shadows_itself_only_where_it_bends_inwards() {
         [[entity]]
         mesh = "torus"
         albedo = [1, 1, 1]"#;
-    let scene = match Scene::parse(text, Path::new("test.toml"), &|_| unreachable!("no files")) {
-        Ok(scene) => scene,
-        Err(error) => panic!("{error}"),
-    };
-    let shapes = RayMeshes::new(&scene);
-    let world = World::new(&scene, &shapes, &scene.at(0.0));
+    let scene = read(text);
+    let world = World::of(&scene, &scene.at(0.0));
     let vertices = receiver_vertices(&scene);
     let cast = RayCast::default().run(&world, &vertices);
     let mesh = &scene.meshes[0];
@@ -157,8 +149,7 @@ fn a_receiver_shadows_itself_only_where_it_bends_inwards() {
 #[test]
 fn runs_repeat_and_seeds_differ() {
     let scene = scene(&format!("{BALL}{SKY}"));
-    let shapes = RayMeshes::new(&scene);
-    let world = World::new(&scene, &shapes, &scene.at(0.0));
+    let world = World::of(&scene, &scene.at(0.0));
     let vertices = sample_vertices(&scene, 40, 9);
     assert_eq!(vertices.len(), 40);
     assert_eq!(vertices, sample_vertices(&scene, 40, 9));
@@ -225,8 +216,7 @@ fn a_pixel_is_lit_where_its_middle_meets_the_floor() {
     let scene = scene(&format!("{light}{}", ball(0.3, [-1.0, 0.3, 0.5])));
     let size = [48, 32];
     let cast = RayCast { rays: 64, runs: 1, ..Default::default() };
-    let shapes = RayMeshes::new(&scene);
-    let world = World::new(&scene, &shapes, &scene.at(0.0));
+    let world = World::of(&scene, &scene.at(0.0));
     let points = pixels::lit_points(&world, size);
     let lit = cast.run_at(&world, &points);
     let to_world = clip_from_world(&scene.data.camera, 1.5).inverse();
@@ -256,8 +246,7 @@ fn a_floor_blocks_the_light_from_below() {
             0.01 - sunk
         );
         let scene = scene(&format!("{patch}{SKY}"));
-        let shapes = RayMeshes::new(&scene);
-        let world = World::new(&scene, &shapes, &scene.at(0.0));
+        let world = World::of(&scene, &scene.at(0.0));
         let vertices: Vec<Vertex> = (0..9).map(|index| Vertex { entity: 1, index }).collect();
         for (vertex, estimate) in vertices.iter().zip(RayCast::default().run(&world, &vertices)) {
             // The floor ends 2 m away, 0.6 degrees below the horizon.
@@ -273,8 +262,7 @@ fn a_floor_blocks_the_light_from_below() {
 fn pixels_and_dense_vertices_agree() {
     let text = text(&format!("{BALL}{}{SKY}", bulb(0.3, [1.5, 3.0, 0.5])));
     let scene = read(&text.replace("cells = 8", "cells = 96").replace("[0, 3, 6]", "[0, 5, 0.5]"));
-    let shapes = RayMeshes::new(&scene);
-    let world = World::new(&scene, &shapes, &scene.at(0.0));
+    let world = World::of(&scene, &scene.at(0.0));
     let size = [48, 32];
     let rows = std::cell::Cell::new(0);
     let cast = RayCast { rays: 256, ..Default::default() };

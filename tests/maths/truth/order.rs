@@ -1,7 +1,7 @@
 //! What stands before a light: what a ray meets before the light's surface.
 
 use super::{ball, bulb, floor_positions, scene};
-use shadow_fields::truth::{RayCast, RayMeshes, Vertex, World, receiver_vertices};
+use shadow_fields::truth::{RayCast, Vertex, World, receiver_vertices};
 
 /// Radiosity of the floor's middle, where the light's cone stands upright, of a light of radius `radius_m` at
 /// `height_m`: albedo 0.6, radiance 9.
@@ -12,8 +12,7 @@ fn below(radius_m: f64, height_m: f64) -> f64 {
 /// Radiosity of the floor's middle with entities `rest`.
 fn middle(rest: &str) -> f64 {
     let scene = scene(rest);
-    let shapes = RayMeshes::new(&scene);
-    let world = World::new(&scene, &shapes, &scene.at(0.0));
+    let world = World::of(&scene, &scene.at(0.0));
     let (middle, _) = floor_positions(&scene).into_iter().find(|(_, at)| at.length() < 1e-6).unwrap();
     let found = RayCast::default().run(&world, &[middle])[0].radiosity[0];
     assert!(found.is_finite(), "{found} of {rest}");
@@ -85,8 +84,7 @@ fn a_receiver_is_lit_across_its_own_hole_by_a_light_within() {
     let torus = "[[mesh]]\nname = \"torus\"\ntorus = { major_m = 1, minor_m = 0.4, segments = 96, sides = 48 }\n\
         [[entity]]\nmesh = \"torus\"\nposition = [0, 9, 0]\nalbedo = [0.6, 0.6, 0.6]\n";
     let scene = scene(&format!("{torus}{}", bulb(0.1, [0.0, 9.0, 0.0])));
-    let shapes = RayMeshes::new(&scene);
-    let world = World::new(&scene, &shapes, &scene.at(0.0));
+    let world = World::of(&scene, &scene.at(0.0));
     let mesh = &scene.meshes[scene.entities[1].mesh];
     let inner = |v: &Vertex| v.entity == 1 && mesh.positions[v.index].length() < 0.601;
     let vertices: Vec<Vertex> = receiver_vertices(&scene).into_iter().filter(inner).collect();

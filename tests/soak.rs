@@ -3,7 +3,7 @@
 
 mod common;
 
-use common::{cache_dir, library, report, skip};
+use common::{cache_dir, library, parse, report, skip};
 use glam::Vec3;
 use shadow_fields::bake::cache::Cache;
 use shadow_fields::bake::{self, Baker};
@@ -61,7 +61,7 @@ fn changed(scene: &Scene, state: u64) -> Scene {
         _ => lamp.scale = 0.2,
     }
     let text = data.to_toml().unwrap();
-    let mut changed = Scene::parse(&text, Path::new("soak.toml"), &shadow_fields::asset::embedded::read).unwrap();
+    let mut changed = parse(&text);
     changed.meshes = scene.meshes.clone();
     changed
 }
@@ -84,7 +84,7 @@ fn frames_neither_drift_nor_take_more_memory() {
         Err(error) => return skip(&error.to_string()),
     };
     let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("fields-soak");
-    let scene = Scene::parse(SCENE, Path::new("soak.toml"), &shadow_fields::asset::embedded::read).unwrap();
+    let scene = parse(SCENE);
     let options = frame::Options {
         bake: bake::Options { lattice: "cube:6x5".parse().unwrap(), face_px: 16, ..Default::default() },
         skip: Skip::ALL,

@@ -115,6 +115,11 @@ impl Gpu {
     }
 }
 
+/// A scene from its text, which may name files of the program.
+pub fn parse(text: &str) -> Scene {
+    Scene::parse(text, Path::new("test.toml"), &shadow_fields::asset::embedded::read).unwrap()
+}
+
 /// A mesh's places and triangles as OBJ text.
 pub fn obj(mesh: &Mesh) -> String {
     let places = mesh.positions.iter().map(|p| format!("v {} {} {}\n", p.x, p.y, p.z));

@@ -2,7 +2,7 @@
 
 #![allow(dead_code)] // every test binary uses its own part
 
-use super::common::{Gpu, gpu};
+use super::common::{Gpu, gpu, parse};
 use glam::{Quat, Vec3};
 use shadow_fields::bake::Baker;
 use shadow_fields::bake::cache::Cache;
@@ -58,8 +58,7 @@ impl Stage {
 
 /// A scene from the text of its meshes, entities and sky; a camera is added.
 pub fn scene(text: &str) -> Scene {
-    let text = format!("{text}\n[camera]\neye = [0, 0, 5]\ntarget = [0, 0, 0]\n");
-    Scene::parse(&text, Path::new("test.toml"), &shadow_fields::asset::embedded::read).unwrap()
+    parse(&format!("{text}\n[camera]\neye = [0, 0, 5]\ntarget = [0, 0, 0]\n"))
 }
 
 /// An object upright at a place in its own size.

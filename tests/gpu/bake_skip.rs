@@ -1,8 +1,7 @@
 //! What a bake leaves out: faces and backs, samples inside solids, and equal meshes.
 
 use crate::common;
-use common::generate;
-use common::gpu;
+use common::{generate, gpu, parse};
 use glam::DVec3;
 use shadow_fields::asset::Mesh;
 use shadow_fields::bake::cache::Cache;
@@ -31,7 +30,7 @@ fn the_same_mesh_under_two_names_is_baked_once() {
         };
         let text: String = names.into_iter().zip(sides).map(mesh).collect();
         let rest = "[environment]\nuniform = [1, 1, 1]\n[camera]\neye = [0, 0, 5]\ntarget = [0, 0, 0]\n";
-        Scene::parse(&format!("{text}{rest}"), "test.toml".as_ref(), &shadow_fields::asset::embedded::read).unwrap()
+        parse(&format!("{text}{rest}"))
     };
     let baker = Baker::new(&gpu.device, &gpu.library);
     let options = bake::Options { lattice: "cube:3x3".parse().unwrap(), face_px: 16, ..Default::default() };

@@ -1,27 +1,24 @@
 //! Light that bounces within a rigid group, against the closed form of a hollow sphere: of all that leaves one place of
 //! its inside, every other place receives the same.
 
-use super::common::{generate, relative_rms};
+use super::common::{generate, parse, relative_rms};
 use super::stage::{Stage, small, stage};
 use glam::Vec3;
-use shadow_fields::asset::{Mesh, embedded};
-use shadow_fields::bake;
+use shadow_fields::asset::Mesh;
 use shadow_fields::bounce::Bounces;
-use shadow_fields::frame;
 use shadow_fields::scene::data::EntityData;
 use shadow_fields::scene::{Lights, Motion, Scene};
 use shadow_fields::truth::raycast::RayCast;
-use shadow_fields::truth::{RayMeshes, Vertex, World, receiver_vertices};
-use std::path::Path;
+use shadow_fields::truth::{Vertex, World, receiver_vertices};
+use shadow_fields::{bake, frame};
 
 const ALBEDO: f32 = 0.6;
 
-/// The inside of a sphere of 1 m.
-fn inside() -> Mesh {
-    let ball = generate::sphere(1.0, 4);
-    let inwards = ball.normals.iter().map(|normal| -*normal).collect();
-    let turned = ball.triangles.iter().map(|[a, b, c]| [*a, *c, *b]).collect();
-    Mesh::new("inside", ball.positions.clone(), inwards, None, turned).unwrap()
+/// The inside of a mesh.
+fn inside(mesh: Mesh) -> Mesh {
+    let inwards = mesh.normals.iter().map(|normal| -*normal).collect();
+    let turned = mesh.triangles.iter().map(|[a, b, c]| [*a, *c, *b]).collect();
+    Mesh::new("inside", mesh.positions, inwards, None, turned).unwrap()
 }
 
 /// A lamp beside the sphere's middle.
@@ -37,7 +34,7 @@ fn lamp() -> EntityData {
 
 fn hollow() -> Scene {
     Scene::builder()
-        .mesh("inside", inside())
+        .mesh("inside", inside(generate::sphere(1.0, 4)))
         .mesh("lamp", generate::sphere(0.05, 2))
         .entity(EntityData { albedo: Vec3::splat(ALBEDO).into(), ..EntityData::of_mesh("inside") })
         .entity(lamp())
@@ -80,7 +77,7 @@ fn what_moves_is_lit_by_what_rests() {
     let Some(stage) = stage() else { return };
     let moving = Motion::Spin { axis: Vec3::Y, period_s: 9.0 };
     let scene = Scene::builder()
-        .mesh("inside", inside())
+        .mesh("inside", inside(generate::sphere(1.0, 4)))
         .mesh("lamp", generate::sphere(0.05, 2))
         .mesh("ball", generate::sphere(0.1, 2))
         .entity(EntityData { albedo: Vec3::splat(ALBEDO).into(), ..EntityData::of_mesh("inside") })
@@ -134,15 +131,14 @@ fn usual(bounces: Bounces) -> frame::Options {
 #[test]
 fn what_moves_and_what_rests_light_each_other() {
     let Some(stage) = stage() else { return };
-    let scene = Scene::parse(THINGS, Path::new("things.toml"), &embedded::read).unwrap();
+    let scene = parse(THINGS);
     let placements = scene.at(0.0);
     let light = |bounces| {
         let mut frame = stage.frame(&scene, usual(bounces));
         stage.light(&mut frame, &placements)
     };
     let [direct, one, all] = [Bounces::None, Bounces::One, Bounces::All].map(light);
-    let shapes = RayMeshes::new(&scene);
-    let world = World::new(&scene, &shapes, &placements);
+    let world = World::of(&scene, &placements);
     let vertices: Vec<Vertex> = receiver_vertices(&scene).into_iter().step_by(7).collect();
     // Fronts of the floor's underside see nothing that the eye does.
     let is_above = |v: &Vertex| v.entity > 0 || scene.meshes[0].normals[v.index].y > 0.5;
@@ -177,10 +173,9 @@ fn a_panel_below_a_ceiling_hides_what_it_lights() {
             ]
             "#
         );
-        let scene = Scene::parse(&text, Path::new("panel.toml"), &embedded::read).unwrap();
+        let scene = parse(&text);
         let placements = scene.at(0.0);
-        let shapes = RayMeshes::new(&scene);
-        let world = World::new(&scene, &shapes, &placements);
+        let world = World::of(&scene, &placements);
         let floor = receiver_vertices(&scene).into_iter().filter(|v| v.entity == 0);
         let floor: Vec<Vertex> = floor.filter(|v| scene.meshes[0].normals[v.index].y > 0.5).step_by(13).collect();
         let rays = |bounces| {
@@ -205,17 +200,13 @@ fn a_panel_below_a_ceiling_hides_what_it_lights() {
 #[test]
 fn light_bounces_through_a_door_and_not_through_walls() {
     let Some(stage) = stage() else { return };
-    let shell = generate::cuboid(Vec3::new(6.0, 2.6, 8.0), 1);
-    let inwards = shell.normals.iter().map(|normal| -*normal).collect();
-    let turned = shell.triangles.iter().map(|[a, b, c]| [*a, *c, *b]).collect();
-    let shell = Mesh::new("shell", shell.positions.clone(), inwards, None, turned).unwrap();
     let stands = |mesh: &str, x: f32, y: f32| EntityData {
         position: Vec3::new(x, y, 0.0),
         albedo: Vec3::splat(0.7).into(),
         ..EntityData::of_mesh(mesh)
     };
     let scene = Scene::builder()
-        .mesh("shell", shell)
+        .mesh("shell", inside(generate::cuboid(Vec3::new(6.0, 2.6, 8.0), 1)))
         .mesh("side", generate::cuboid(Vec3::new(2.5, 2.6, 0.15), 1))
         .mesh("lintel", generate::cuboid(Vec3::new(1.0, 0.5, 0.15), 1))
         .mesh("lamp", generate::sphere(0.15, 2))
@@ -238,8 +229,7 @@ fn light_bounces_through_a_door_and_not_through_walls() {
         v.entity == 0 && normal.y.abs() > 0.5 && place.z > 0.2 && place.x.abs() > 1.2
     };
     let dark: Vec<Vertex> = receiver_vertices(scene).into_iter().filter(is_dark).step_by(5).collect();
-    let shapes = RayMeshes::new(scene);
-    let world = World::new(scene, &shapes, &placements);
+    let world = World::of(scene, &placements);
     let rays = RayCast { rays: 2048, bounces: 1, ..RayCast::default() }.run(&world, &dark);
     let sums = |of: &dyn Fn(usize) -> f64| (0..dark.len()).map(of).sum::<f64>();
     let found = sums(&|i| f64::from(light[0][dark[i].index][0]));
@@ -260,7 +250,7 @@ fn light_bounces_through_a_door_and_not_through_walls() {
 #[test]
 fn no_light_jumps_as_a_thing_moves() {
     let Some(stage) = stage() else { return };
-    let scene = Scene::parse(THINGS, Path::new("things.toml"), &embedded::read).unwrap();
+    let scene = parse(THINGS);
     let mut frame = stage.frame(&scene, usual(Bounces::One));
     let mut placements = scene.at(0.0);
     let mut before: Option<Vec<Vec<[f32; 3]>>> = None;

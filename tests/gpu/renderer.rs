@@ -1,6 +1,6 @@
 //! The front door: scenes made in code, light and pictures by `Renderer`, and what it refuses.
 
-use crate::common::gpu;
+use crate::common::{gpu, parse};
 use glam::{Quat, Vec3};
 use shadow_fields::asset::environment::EnvironmentData;
 use shadow_fields::bake;
@@ -9,7 +9,6 @@ use shadow_fields::gpu::Gpu;
 use shadow_fields::prelude::{Cache, Camera, DeviceOptions, EntityData, Error, Generator, Quality};
 use shadow_fields::prelude::{Placement, RenderOptions, Renderer, Scene};
 use shadow_fields::scene::{Lights, Output, SceneBuilder};
-use std::path::Path;
 
 /// A floor, a box that turns on it and a lamp under a grey sky.
 fn room() -> SceneBuilder {
@@ -42,8 +41,7 @@ fn refused(builder: SceneBuilder) -> String {
 #[test]
 fn a_scene_made_in_code_is_that_of_its_file() {
     let made = room().build().unwrap();
-    let read =
-        Scene::parse(&made.to_toml().unwrap(), Path::new("room.toml"), &shadow_fields::asset::embedded::read).unwrap();
+    let read = parse(&made.to_toml().unwrap());
     assert_eq!(made.data, read.data);
     assert_eq!(made.entities, read.entities);
     assert!(made.meshes.iter().zip(&read.meshes).all(|(a, b)| a == b && a.content_hash() == b.content_hash()));

@@ -1,10 +1,9 @@
 //! Self-visibility: closed forms, the shader's lookup against Rust's, direct light against rays.
 
 use crate::common;
-use common::generate;
-use common::gpu;
+use common::{generate, gpu, parse};
 use glam::{DVec3, Vec3};
-use shadow_fields::asset::{Mesh, embedded};
+use shadow_fields::asset::Mesh;
 use shadow_fields::bake::surfaces::{BakedSurface, GroupPlan};
 use shadow_fields::bake::{self, TRANSFER_OFFSET, Wanted};
 use shadow_fields::field::quantity::channel_stride;
@@ -13,13 +12,12 @@ use shadow_fields::field::self_visibility::{
 };
 use shadow_fields::field::sub_light::{LightPart, SeenLight};
 use shadow_fields::gpu::{Bind, Buffer, Commands, ComputePipeline};
-use shadow_fields::scene::{Placement, Scene};
+use shadow_fields::scene::Placement;
 use shadow_fields::sh::lobe;
 use shadow_fields::sh::quadrature::random_direction;
 use shadow_fields::shaders::{Library, ShaderPermutation};
-use shadow_fields::truth::{RayMeshes, Vertex, World};
+use shadow_fields::truth::{Vertex, World};
 use std::f64::consts::TAU;
-use std::path::Path;
 use std::sync::Arc;
 
 /// The surface of a mesh that nothing surrounds.
@@ -177,11 +175,10 @@ fn direct_light_is_that_of_rays() {
     const LIGHTS: usize = 12;
     let text = "[camera]\neye = [0, 0, 5]\ntarget = [0, 0, 0]\n[[mesh]]\nname = \"pot\"\nfile = \"assets/meshes/teapot.obj\"\n\
                 [[entity]]\nmesh = \"pot\"\n";
-    let scene = Scene::parse(text, Path::new("test.toml"), &embedded::read).unwrap();
+    let scene = parse(text);
     let mesh = &scene.meshes[0];
-    let shapes = RayMeshes::new(&scene);
     let placement = Placement { position: Vec3::ZERO, rotation: glam::Quat::IDENTITY, scale: 1.0 };
-    let world = World::new(&scene, &shapes, &[placement]);
+    let world = World::of(&scene, &[placement]);
     let surface = bake(mesh);
     let transfer = surface.transfer.expect("some ray is blocked");
     let maps = surface.self_visibility.expect("some ray is blocked");

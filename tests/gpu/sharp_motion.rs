@@ -2,10 +2,9 @@
 //! without flicker.
 
 use crate::common;
-use common::gpu;
+use common::{gpu, parse};
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;
-use shadow_fields::asset::embedded;
 use shadow_fields::check::sharp as check;
 use shadow_fields::draw::{Antialias, Shading};
 use shadow_fields::frame::{self, Frame};
@@ -22,15 +21,14 @@ const BALL_RADIUS_M: f64 = 0.5;
 
 /// A floor of that many cells along a side, a ball above it and a ball that shines.
 fn scene(cells: usize) -> Scene {
-    let text = format!(
+    parse(&format!(
         "[camera]\neye = [0, 2, 5]\ntarget = [0, 0.5, 0]\n\
         [[mesh]]\nname = \"floor\"\nplane = {{ size_m = 6, cells = {cells} }}\n\
         [[mesh]]\nname = \"ball\"\nsphere = {{ radius_m = {BALL_RADIUS_M}, subdivisions = 5 }}\n\
         [[entity]]\nmesh = \"floor\"\nalbedo = [1, 1, 1]\n\
         [[entity]]\nmesh = \"ball\"\nposition = [0, 0.8, 0]\n\
         [[entity]]\nmesh = \"ball\"\nposition = [0, 3.5, 0]\nemission = [1, 1, 1]\n"
-    );
-    Scene::parse(&text, "test.toml".as_ref(), &embedded::read).unwrap()
+    ))
 }
 
 fn frame(gpu: &common::Gpu, scene: &Scene) -> Frame {

@@ -1,6 +1,7 @@
 //! What is not done: an unmoved scene merges nothing, and one in which something moves comes to the bits of a full
 //! merge; what is dropped as small stays within its bound.
 
+use crate::common::parse;
 use crate::stage;
 use glam::{Quat, Vec3};
 use shadow_fields::asset::Mesh;
@@ -183,8 +184,7 @@ fn what_is_dropped_stays_within_its_bound() {
     for entity in &mut patch.entities[1..] {
         entity.receives = Some(false);
     }
-    let text = patch.to_toml().unwrap();
-    town = Scene::parse(&text, std::path::Path::new("patch.toml"), &shadow_fields::asset::embedded::read).unwrap();
+    town = parse(&patch.to_toml().unwrap());
     let placements = town.at(0.0);
     let mut full = stage.frame(&town, small());
     let exact = stage.light(&mut full, &placements);

@@ -3,25 +3,21 @@
 mod cache;
 mod transfer;
 
-use crate::common::{Gpu, generate, gpu, library};
+use crate::common::{Gpu, generate, gpu, library, parse};
 use fastrand::Rng;
 use glam::{DVec3, Vec3};
 use half::f16;
 use shadow_fields::asset::Mesh;
 use shadow_fields::bake::cache::Cache;
 use shadow_fields::bake::project::{self};
-use shadow_fields::bake::surface::Surface;
-use shadow_fields::bake::surface::{inside, pushed_out};
+use shadow_fields::bake::surface::{Surface, inside, pushed_out};
 use shadow_fields::bake::triangles::unit_positions;
-use shadow_fields::bake::{self, Baker, SceneNeeds};
-use shadow_fields::bake::{TRANSFER_OFFSET, capture};
+use shadow_fields::bake::{self, Baker, SceneNeeds, TRANSFER_OFFSET, capture};
 use shadow_fields::field::{FieldHeader, FieldKind, ShadowField, Storage};
 use shadow_fields::gpu::Device;
-use shadow_fields::scene::Scene;
 use shadow_fields::scene_buffers::SceneBuffers;
 use shadow_fields::sh::lobe;
 use shadow_fields::sh::quadrature::random_direction;
-use std::path::Path;
 use std::sync::{Arc, OnceLock};
 
 fn quiet(_: u32, _: u32) {}
@@ -214,8 +210,7 @@ fn a_field_lands_at_its_place_in_a_scene() {
         mesh("ball", "sphere = { radius_m = 1.0, subdivisions = 2 }"),
         mesh("ring", "torus = { major_m = 1.0, minor_m = 0.35, segments = 32, sides = 16 }"),
     ];
-    let read = &shadow_fields::asset::embedded::read;
-    let scene = Scene::parse(&text.concat(), Path::new("test.toml"), read).unwrap();
+    let scene = parse(&text.concat());
     let needs = SceneNeeds::of(&scene, &options, shadow_fields::scene::Lights::Sh);
     let baker = Baker::new(&gpu.device, &gpu.library);
     let baked = bake::ensure(&baker, &Cache::new(None), &scene, &needs, &|_, _, _| ()).unwrap();

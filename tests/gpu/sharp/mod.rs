@@ -2,33 +2,28 @@
 
 mod change;
 
-use crate::common::{Gpu, gpu, relative_rms};
+use crate::common::{Gpu, gpu, parse, relative_rms};
 use shadow_fields::asset::embedded;
 use shadow_fields::check::sharp as check;
 use shadow_fields::draw::{Antialias, Shading};
 use shadow_fields::frame::{self};
 use shadow_fields::lists::skip::Skip;
 use shadow_fields::scene::{Lights, Scene};
-use shadow_fields::truth::{RayCast, RayMeshes, World, sample_vertices};
+use shadow_fields::truth::{RayCast, World, sample_vertices};
 
 /// Relative root mean square error of the light on vertices against rays.
 fn error(gpu: &Gpu, scene: &Scene, options: frame::Options, rays: u32) -> f64 {
     let placements = scene.at(0.0);
     let mut frame = gpu.frame(scene, options);
     frame.render(&placements, None).unwrap();
-    let shapes = RayMeshes::new(scene);
     let vertices = sample_vertices(scene, 800, 3);
-    let world = World::new(scene, &shapes, &placements);
+    let world = World::of(scene, &placements);
     let truth = RayCast { rays, runs: 2, ..Default::default() }.run(&world, &vertices);
     let lit: Vec<Vec<[f32; 3]>> = (0..scene.entities.len())
         .map(|entity| if scene.entities[entity].receives { frame.radiosity(entity).unwrap() } else { Vec::new() })
         .collect();
     let found = vertices.iter().flat_map(|vertex| lit[vertex.entity][vertex.index]).map(f64::from);
     relative_rms(found.zip(truth.iter().flat_map(|truth| truth.radiosity)))
-}
-
-fn parse(text: &str) -> Scene {
-    Scene::parse(text, "test.toml".as_ref(), &embedded::read).unwrap()
 }
 
 const HEAD: &str = "[camera]\neye = [0, 2, 5]\ntarget = [0, 0.5, 0]\n\

@@ -94,11 +94,6 @@ impl SceneNeeds {
         fields + volumes.map(|volume| (volume.nodes.count() * node_bytes) as u64).sum::<u64>()
     }
 
-    /// Whether everything is in the cache, so that [`ensure()`] bakes nothing.
-    pub fn are_cached(&self, scene: &Scene, cache: &Cache) -> bool {
-        self.missing(scene, cache).is_empty()
-    }
-
     /// The bakes that [`ensure()`] will not find in the cache, in its order: the name that progress is told by, and the
     /// number of captures.
     pub fn missing(&self, scene: &Scene, cache: &Cache) -> Vec<(String, u32)> {

@@ -2,7 +2,7 @@
 //! members never stand on each other's lists.
 
 use super::Scene;
-use super::light::{self, Lights};
+use super::light::Lights;
 
 /// The group of every entity. An entity that moves is a group by itself.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -24,7 +24,7 @@ impl Groups {
     /// Lights in bands (`--lights sh`) meet what lies before them in the chain of a vertex, so that every entity is a
     /// group by itself there.
     pub fn new(scene: &Scene, lights: Lights) -> Self {
-        let banded = lights == Lights::Sh && light::has_emitters(scene);
+        let banded = lights == Lights::Sh && scene.entities.iter().any(|entity| entity.emits);
         let rests = |entity: &usize| scene.is_at_rest(*entity) && !banded;
         let first = (0..scene.entities.len()).find(rests).unwrap_or(0) as u32;
         let group = |entity: usize| if rests(&entity) { first } else { entity as u32 };

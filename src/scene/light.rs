@@ -151,11 +151,6 @@ pub fn has_harmonics(scene: &Scene, lights: Lights) -> bool {
     !scene.environment.is_none() || emitters(scene).any(|entity| !LightMethod::of(scene, entity, lights).is_sharp())
 }
 
-/// Whether any entity emits.
-pub(crate) fn has_emitters(scene: &Scene) -> bool {
-    emitters(scene).next().is_some()
-}
-
 fn emitters(scene: &Scene) -> impl Iterator<Item = usize> + '_ {
     (0..scene.entities.len()).filter(|&entity| scene.entities[entity].emits)
 }

@@ -117,7 +117,7 @@ impl Viewer {
         let cache = self.setup.cache.clone();
         let scene = self.editor.scene().clone();
         let needs = SceneNeeds::of(&scene, &self.setup.frame.bake, self.setup.frame.lights);
-        if needs.are_cached(&scene, &cache) {
+        if needs.missing(&scene, &cache).is_empty() {
             return self.build();
         }
         let options = self.setup.options.clone();

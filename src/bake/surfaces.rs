@@ -120,7 +120,6 @@ pub struct SurfacePlan {
 
 impl SurfacePlan {
     pub fn new(scene: &Scene, groups: &Groups, options: &Options, wanted: Wanted) -> Self {
-        let rest = scene.at(0.0);
         let moves = (0..scene.data.entities.len()).any(|entity| !scene.is_at_rest(entity));
         let refinement = (options.vertices > 0).then_some((options.vertices, moves));
         let member = |entity: usize, placement: Placement| {
@@ -150,7 +149,7 @@ impl SurfacePlan {
                 plan.or_insert(plans.len());
                 vec![member]
             } else {
-                entities.iter().map(|&entity| member(entity, rest[entity])).collect()
+                entities.iter().map(|&entity| member(entity, scene.data.entities[entity].fixed())).collect()
             };
             let bands = options.bands;
             let plan = GroupPlan { entities, members, wanted, bands, refinement, key: None, volume: None }.named();
@@ -236,7 +235,12 @@ impl GroupPlan {
     /// `None` where there are none.
     fn moved_among(&self, scene: &Scene) -> Option<([DVec3; 2], f64)> {
         let blocks = self.occluders();
-        if !self.wanted.transfer || self.members.len() == 1 || blocks.iter().filter(|blocks| **blocks).count() < 2 {
+        let rests = self.entities.first().is_some_and(|first| scene.is_at_rest(*first));
+        if !rests
+            || !self.wanted.transfer
+            || self.members.len() == 1
+            || blocks.iter().filter(|blocks| **blocks).count() < 2
+        {
             return None;
         }
         // What may be put anywhere is looked for where more than a ground stands.
@@ -268,7 +272,7 @@ impl GroupPlan {
     pub fn title(&self) -> String {
         match &self.members[..] {
             [only] => format!("{} view", only.mesh.name),
-            members => format!("view of {} things at rest", members.len()),
+            members => format!("view of {} things", members.len()),
         }
     }
 

@@ -487,6 +487,11 @@ impl EntityData {
         }
     }
 
+    /// The placement without its motion: within what carries it.
+    pub(crate) fn fixed(&self) -> Placement {
+        PlacementF64::new(self.position, self.rotation, self.scale).rounded()
+    }
+
     /// The placement at `time_s` seconds.
     pub fn at(&self, time_s: f64) -> Placement {
         let rest = PlacementF64::new(self.position, self.rotation, self.scale);

@@ -3,8 +3,9 @@
 
 use super::Scene;
 use super::light::Lights;
+use super::motion::Motion;
 
-/// The group of every entity. An entity that moves is a group by itself.
+/// The group of every entity.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Groups {
     of: Vec<u32>,
@@ -19,15 +20,25 @@ pub struct Groups {
 }
 
 impl Groups {
-    /// The groups of a scene: all entities at rest are one, less those that were taken out (`Scene::loosen`).
+    /// The groups of a scene: all entities at rest are one, and so are those that one node carries, as the pieces of a
+    /// car, less those that were taken out (`Scene::loosen`). Whatever else moves is a group by itself.
     ///
     /// Lights in bands (`--lights sh`) meet what lies before them in the chain of a vertex, so that every entity is a
     /// group by itself there.
     pub fn new(scene: &Scene, lights: Lights) -> Self {
-        let banded = lights == Lights::Sh && scene.entities.iter().any(|entity| entity.emits);
-        let rests = |entity: &usize| scene.is_at_rest(*entity) && !banded;
-        let first = (0..scene.entities.len()).find(rests).unwrap_or(0) as u32;
-        let group = |entity: usize| if rests(&entity) { first } else { entity as u32 };
+        if lights == Lights::Sh && scene.entities.iter().any(|entity| entity.emits) {
+            return Groups::alone(scene);
+        }
+        // The first member of every group and what carries it, nothing where it rests.
+        let mut firsts: Vec<(u32, &[Motion])> = Vec::new();
+        let group = |entity: usize| {
+            let Some(carriers) = scene.carriers(entity) else { return entity as u32 };
+            let known = firsts.iter().find(|(_, motion)| *motion == carriers);
+            known.map(|(first, _)| *first).unwrap_or_else(|| {
+                firsts.push((entity as u32, carriers));
+                entity as u32
+            })
+        };
         Groups::of(scene, (0..scene.entities.len()).map(group).collect())
     }
 
@@ -110,6 +121,20 @@ mod tests {
         scene.loosen(0);
         assert_eq!(Groups::new(&scene, Lights::Sharp).members(), [vec![0], vec![1], vec![2, 3]]);
         assert_eq!(Groups::alone(&scene).members(), [[0], [1], [2], [3]]);
+    }
+
+    #[test]
+    fn entities_that_one_node_carries_are_one_group() {
+        let carried = |x: f32| {
+            let node = format!(
+                "motion = [{{ node = {{ position_keys = {{ times_s = [0, 1], values = [[0, 0, 0], [{x}, 0, 0]] }} }} }}]"
+            );
+            format!("[[entity]]\nmesh = \"ball\"\n{node}\n")
+        };
+        let mut scene = scene(&[1.0, 2.0, 1.0, 1.0].map(carried).concat());
+        assert_eq!(Groups::new(&scene, Lights::Sharp).members(), [vec![0, 2, 3], vec![1], vec![4, 6, 7], vec![5]]);
+        scene.loosen(6);
+        assert_eq!(Groups::new(&scene, Lights::Sharp).members()[2..], [vec![4, 7], vec![5], vec![6]]);
     }
 
     #[test]

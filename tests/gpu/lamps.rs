@@ -2,14 +2,15 @@
 
 use super::common::{generate, relative_rms};
 use super::stage::{Stage, stage};
-use glam::{Vec2, Vec3};
+use glam::{DQuat, Vec2, Vec3};
 use shadow_fields::asset::Mesh;
+use shadow_fields::asset::environment::EnvironmentData;
 use shadow_fields::asset::generate::Generator;
 use shadow_fields::bake;
 use shadow_fields::bounce::Bounces;
 use shadow_fields::frame;
 use shadow_fields::scene::data::EntityData;
-use shadow_fields::scene::motion::RotationData;
+use shadow_fields::scene::motion::{Motion, Node, RotationData};
 use shadow_fields::scene::{Camera, Scene};
 use shadow_fields::truth::pixels;
 use shadow_fields::truth::ray_mesh::RayMeshes;
@@ -80,6 +81,44 @@ fn no_light_comes_through_a_lamp_shade() {
         let error = picture_error(&stage, &under_a_shade(profile, height));
         assert!(error < 0.03, "{height}: {error}");
     }
+}
+
+/// What one node carries looks as if it stood there at rest.
+#[test]
+fn what_is_carried_together_shades_itself_as_at_rest() {
+    let Some(stage) = stage() else { return };
+    let node = Node::still(Vec3::new(-0.2, 0.1, 0.0), DQuat::from_rotation_y(0.3), 0.9);
+    let picture = |motion: Vec<Motion>| {
+        let at = |mesh: &str, position: [f32; 3]| {
+            let entity = EntityData { position: position.into(), motion: motion.clone(), ..EntityData::of_mesh(mesh) };
+            let place = EntityData { motion: vec![Motion::Node(Box::new(node.clone()))], ..entity.clone() }.at(0.0);
+            let [x, y, z, w] = place.rotation.to_array();
+            let rotation = RotationData::Quaternion([x, y, z, w]);
+            let stands = EntityData { position: place.position, rotation, scale: place.scale, ..entity.clone() };
+            if motion.is_empty() { stands } else { entity }
+        };
+        let scene = Scene::builder()
+            .camera(Camera::new([0.3, 0.9, 2.2], [-0.1, 0.6, 0.0]))
+            .environment(EnvironmentData { uniform: Some(Vec3::splat(0.5)), ..EnvironmentData::default() })
+            .mesh("plate", generate::cuboid(Vec3::new(0.9, 0.04, 0.9), 4))
+            .mesh("back", generate::cuboid(Vec3::new(0.9, 1.0, 0.04), 4))
+            .mesh("ring", generate::torus(0.2, 0.08, 24, 12))
+            .mesh("bulb", Generator::Sphere { radius_m: 0.05, subdivisions: 2 })
+            .entity(at("plate", [0.0, 0.02, 0.0]))
+            .entity(at("plate", [0.0, 1.06, 0.0]))
+            .entity(at("back", [0.0, 0.54, -0.43]))
+            .entity(at("ring", [0.0, 0.12, 0.0]))
+            .entity(EntityData { emission: Vec3::splat(10.0), ..at("bulb", [0.1, 0.85, 0.05]) });
+        let bake = bake::Options { groups: true, vertices: 0, ..bake::Options::default() };
+        let scene = scene.build().unwrap();
+        let mut frame = stage.frame(&scene, frame::Options { size: [96, 64], bake, ..frame::Options::default() });
+        frame.render(&scene.at(0.0), Some(f32::INFINITY)).unwrap();
+        frame.picture()
+    };
+    let pairs = picture(vec![Motion::Node(Box::new(node.clone()))]).into_iter().zip(picture(Vec::new()));
+    let error = relative_rms(pairs.map(|(carried, rests)| (f64::from(carried), f64::from(rests))));
+    // Rays are cast in the frame of the group.
+    assert!(error < 0.015, "{error}");
 }
 
 /// A bulb that high within a shade, which is a profile (radius, height) turned around.

@@ -420,9 +420,8 @@ impl Builder {
         self.finish(&stage.stands, entities)
     }
 
-    /// The entities of parts and where they stand. Loose convex pieces of what rests become entities of their own, since
-    /// their outlines hold up to where they touch: a table is a board and its legs. What moves stays whole, because one
-    /// field costs a merge less than many.
+    /// The entities of parts and where they stand. Loose convex pieces become entities of their own, since their outlines
+    /// hold up to where they touch: a table is a board and its legs.
     fn entities(&mut self, mut parts: Vec<Placed>) -> Result<Vec<EntityData>> {
         let bend = |stand: &Stand| SplitTransform::new(stand.fixed.matrix3).map(|split| split.baked());
         let key = |placed: &Placed| Some(mesh_key(placed.part, bend(&placed.stand)?));
@@ -504,7 +503,7 @@ impl Builder {
     /// of a plant.
     fn piece_count(&mut self, placed: &Placed) -> Result<u32> {
         let Some(primitive) = self.reader.primitive(placed.part)? else { return Ok(1) };
-        let is_cut = primitive.surface.is_solid() && placed.stand.motion.is_empty();
+        let is_cut = primitive.surface.is_solid();
         Ok(if is_cut { primitive.shape.piece_count() } else { 1 })
     }
 

@@ -325,6 +325,10 @@ float over_parts(Surface surface, SeenLight light) {
 }
 #endif
 
+#if CUBOIDS
+#include "sharp_cuboid.glsl"
+#endif
+
 #if SHEETS
 #include "sharp_sheet.glsl"
 #endif
@@ -456,7 +460,6 @@ vec3 chain_sum(Surface surface, Entity shining, bool open, uint first, uint coun
                 }
             } while (has_outline(packed) && j < count);
 #if SHEETS
-            // They stand behind all others of a chain.
             SheetShadow shadow;
             shadow.free = vec4(1.0);
             EACH for (uint k = 0; k < 4; k++) {
@@ -476,6 +479,27 @@ vec3 chain_sum(Surface surface, Entity shining, bool open, uint first, uint coun
 #if EDGES
             nearest = max(nearest, finest);
 #endif
+#endif
+#if CUBOIDS
+            do {
+                if (is_kind(packed, ENTRY_CUBOID)) {
+#if EDGES
+                    finest = 0.0;
+#endif
+                    vec4 free = past_cuboid(ENTITY(packed & SKY_CHAIN), surface, light, block);
+                    share *= free;
+#if EDGES
+#if FINDS_STATES
+                    bool matters = finest > 0.0 || free != vec4(1.0);
+                    near_occluders |= matters ? occluder_bit(packed & SKY_CHAIN) : 0;
+#endif
+                    covered = covered || (finest == 0.0 && free == vec4(0.0));
+                    nearest = max(nearest, finest);
+#endif
+                    j = next_entry(surface, first, count, j + 1, true);
+                    packed = entry_at(first + j);
+                }
+            } while (is_kind(packed, ENTRY_CUBOID) && j < count);
 #endif
 #if EDGES
             hidden = hidden && covered;

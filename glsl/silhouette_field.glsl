@@ -173,7 +173,7 @@ vec2 through_box(uint field, vec3 point, vec3 direction) {
 // nearest point may lie off the ray, and the object then stands where the ray passes its box: all of it, where the ray
 // enters and leaves the box between point and limit, with a ramp where the box reaches beyond either.
 float counts_between(float away, float limit, vec2 in_box) {
-#if BOXES
+#if BOXES || CUBOIDS
     bool apart = in_box[1] < TOUCHING || in_box[0] > limit - TOUCHING;
     away = min(max(away, in_box[0]), in_box[1]);
     float begins = max(fade(away), clamp(1.0 + in_box[0] / NEAREST, 0.0, 1.0));

@@ -88,7 +88,8 @@ shared_struct! {
         area_y: [f32; 4],
         /// Factors of v (the square of the cosine to the second axis), u u, v v and u v.
         area_terms: [f32; 4],
-        /// First quad of its silhouette field, with [`HAS_HALVES`] where it has maps of halves; 0 without a field.
+        /// First quad of its silhouette field, with [`HAS_HALVES`] where it has maps of halves, or of the box that it is;
+        /// 0 without either.
         silhouette: u32,
         /// Shape of its sharp light: a [`LightKind`].
         light_kind: u32,
@@ -271,6 +272,8 @@ pub enum ListEntry {
     Cap { entity: u32, light: Option<u32> },
     /// As [`ListEntry::Occlude`], of a sheet.
     Sheet { entity: u32, light: Option<u32> },
+    /// As [`ListEntry::Occlude`], of a box before a sharp light.
+    Cuboid { entity: u32, light: Option<u32> },
     /// Multiply the sky's chain by the visibility past all that rests, from where it began; it names its receiver.
     Volume { receiver: u32 },
     /// Meet a light; `channel` is `None` for a light of one colour, which shares the occlusion field.
@@ -289,21 +292,26 @@ impl ListEntry {
         [packed & ENTRY_ENTITIES, packed >> ENTRY_BITS & ENTRY_ENTITIES]
     }
 
+    /// A number for each kind of those that are no lights.
+    pub fn kind(packed: u32) -> u32 {
+        packed >> (2 * ENTRY_BITS + 1)
+    }
+
     pub fn is_light(packed: u32) -> bool {
         packed >> (2 * ENTRY_BITS) & 1 == 1
     }
 
     /// The 32 bits that `merge_layout.glsl` takes apart.
     pub fn pack(self) -> u32 {
+        let occlude = |entity: u32, light: Option<u32>, kind: u32| {
+            entity | light.unwrap_or(ENTRY_ENTITIES) << ENTRY_BITS | kind << (2 * ENTRY_BITS + 1)
+        };
         match self {
-            ListEntry::Occlude { entity, light } => entity | light.unwrap_or(ENTRY_ENTITIES) << ENTRY_BITS,
-            ListEntry::Cap { entity, light } => ListEntry::Occlude { entity, light }.pack() | 1 << (2 * ENTRY_BITS + 1),
-            ListEntry::Sheet { entity, light } => {
-                ListEntry::Occlude { entity, light }.pack() | 2 << (2 * ENTRY_BITS + 1)
-            }
-            ListEntry::Volume { receiver } => {
-                ListEntry::Occlude { entity: receiver, light: None }.pack() | 3 << (2 * ENTRY_BITS + 1)
-            }
+            ListEntry::Occlude { entity, light } => occlude(entity, light, 0),
+            ListEntry::Cap { entity, light } => occlude(entity, light, 1),
+            ListEntry::Sheet { entity, light } => occlude(entity, light, 2),
+            ListEntry::Volume { receiver } => occlude(receiver, None, 3),
+            ListEntry::Cuboid { entity, light } => occlude(entity, light, 4),
             ListEntry::Shine { entity, channel, last } => {
                 let flags = 1 | channel.unwrap_or(3) << 1 | u32::from(last) << 3;
                 entity | entity << ENTRY_BITS | flags << (2 * ENTRY_BITS)

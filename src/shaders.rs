@@ -75,6 +75,7 @@ embedded!(
     "self_visibility.glsl",
     "sharp.comp",
     "sharp_light.glsl",
+    "sharp_cuboid.glsl",
     "sharp_sheet.glsl",
     "sheet.glsl",
     "show.frag",

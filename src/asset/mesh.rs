@@ -4,6 +4,7 @@ use glam::{DVec3, Vec2, Vec3};
 
 use super::{enclose, outline, topology};
 use crate::error::{Error, Result};
+use crate::field::cuboid::Cuboid;
 use crate::field::sheet::Rectangle;
 use crate::field::sub_light::{LampFace, TUBE};
 
@@ -42,6 +43,7 @@ pub struct Mesh {
     content_hash: [u8; 32],
     panel: Option<LampFace>,
     rectangle: Option<Rectangle>,
+    cuboid: Option<Cuboid>,
     two_sided: bool,
 }
 
@@ -154,9 +156,11 @@ impl Mesh {
             content_hash,
             panel: None,
             rectangle: None,
+            cuboid: None,
             two_sided: false,
         };
         mesh.rectangle = outline::rectangle(&mesh);
+        mesh.cuboid = outline::cuboid(&mesh);
         if mesh.colors.is_none() {
             mesh.panel = mesh.rectangle.map_or_else(|| mesh.tube(), |rectangle| rectangle.as_lamp());
         }
@@ -312,10 +316,11 @@ impl Mesh {
         self.two_sided
     }
 
-    /// The mesh as one that has holes: neither closed nor a rectangle.
+    /// The mesh as one that has holes: neither closed nor a rectangle or a box.
     pub(super) fn opened(mut self) -> Self {
         self.shape = topology::Topology { closed: false, solid: false, convex: false, ..self.shape };
         self.rectangle = None;
+        self.cuboid = None;
         self.panel = None;
         self
     }
@@ -327,6 +332,11 @@ impl Mesh {
     /// The rectangle that the mesh covers, if it is flat and does.
     pub fn rectangle(&self) -> Option<Rectangle> {
         self.rectangle
+    }
+
+    /// The box that the mesh is, if it is one.
+    pub fn cuboid(&self) -> Option<Cuboid> {
+        self.cuboid
     }
 
     pub(super) fn with_panel(self, panel: LampFace) -> Self {

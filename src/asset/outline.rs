@@ -1,6 +1,7 @@
-//! Finds flat meshes that cover a rectangle.
+//! Finds flat meshes that cover a rectangle, and boxes.
 
 use super::mesh::Mesh;
+use crate::field::cuboid::Cuboid;
 use crate::field::sheet::Rectangle;
 use glam::{DVec2, DVec3};
 
@@ -40,10 +41,39 @@ pub(super) fn rectangle(mesh: &Mesh) -> Option<Rectangle> {
         .then_some(Rectangle { axes, half_m })
 }
 
+/// By how much the cosine of the angle between a box's face and its edges may differ from 0 or 1.
+const SQUARE: f64 = 1e-4;
+
+/// The box that a convex mesh is, if it is one: however it is turned and its faces are cut.
+pub(super) fn cuboid(mesh: &Mesh) -> Option<Cuboid> {
+    let (centre, radius) = mesh.bounding_sphere();
+    let place = |v: u32| (mesh.positions[v as usize] - centre).as_dvec3() / f64::from(radius);
+    let normal = |t: &[u32; 3]| {
+        let [a, b, c] = t.map(place);
+        (b - a).cross(c - a).try_normalize()
+    };
+    if !mesh.is_convex() {
+        return None;
+    }
+    let x = mesh.triangles.iter().find_map(normal)?;
+    let y = mesh.triangles.iter().filter_map(normal).find(|normal| normal.dot(x).abs() < SQUARE)?;
+    let y = (y - y.dot(x) * x).normalize();
+    let axes = [x, y, x.cross(y)];
+    let is_face = |normal: DVec3| axes.iter().any(|axis| axis.dot(normal).abs() > 1.0 - SQUARE);
+    let reach = |axis: &DVec3| {
+        let along = || (0..mesh.positions.len() as u32).map(|v| axis.dot(place(v)));
+        [along().fold(f64::MAX, f64::min), along().fold(f64::MIN, f64::max)]
+    };
+    let ends = axes.each_ref().map(reach);
+    let in_middle = ends.iter().all(|[low, high]| (low + high).abs() < SQUARE);
+    (in_middle && mesh.triangles.iter().filter_map(normal).all(is_face))
+        .then(|| Cuboid { half_edges: std::array::from_fn(|i| 0.5 * (ends[i][1] - ends[i][0]) * axes[i]) })
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::asset::generate::{cuboid, plane};
+    use crate::asset::generate::{self, cuboid, plane};
     use glam::{Quat, Vec3};
 
     fn mesh(positions: Vec<Vec3>, triangles: Vec<[u32; 3]>) -> Mesh {
@@ -75,6 +105,27 @@ mod tests {
                 assert!(rectangle.axes.iter().all(|axis| axis.dot(tilt).abs() < 1e-6 && axis.is_normalized()));
             }
         }
+    }
+
+    #[test]
+    fn boxes_are_found_however_they_are_turned() {
+        let turn = Quat::from_axis_angle(Vec3::new(0.6, 0.0, 0.8), 1.0);
+        for (size, cells) in [(Vec3::ONE, 1), (Vec3::new(3.0, 0.02, 1.0), 3)] {
+            let solid = cuboid(size, cells);
+            let place = |p: &Vec3| turn * *p + Vec3::new(4.0, -1.0, 2.0);
+            let turned = mesh(solid.positions.iter().map(place).collect(), solid.triangles.clone());
+            let mut found = turned.cuboid().unwrap().half_edges.map(|edge| 2.0 * edge.length());
+            let mut wanted = size.as_dvec3().to_array().map(|edge| 2.0 * edge / size.as_dvec3().length());
+            found.sort_by(f64::total_cmp);
+            wanted.sort_by(f64::total_cmp);
+            assert!((0..3).all(|i| (found[i] - wanted[i]).abs() < 1e-4), "{found:?} {wanted:?}");
+        }
+        let skewed = cuboid(Vec3::ONE, 1);
+        let positions = skewed.positions.iter().map(|p| Vec3::new(p.x + 0.1 * p.y, p.y, p.z)).collect();
+        assert!(mesh(positions, skewed.triangles.clone()).cuboid().is_none(), "skewed");
+        assert!(generate::sphere(1.0, 2).cuboid().is_none(), "a ball");
+        let wedge = skewed.positions.iter().map(|p| Vec3::new(p.x * (0.6 + p.y), p.y, p.z)).collect();
+        assert!(mesh(wedge, skewed.triangles).cuboid().is_none(), "a wedge");
     }
 
     #[test]

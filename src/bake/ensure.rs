@@ -160,7 +160,8 @@ pub fn needs(scene: &Scene, mesh: usize, lights: Lights, groups: &Groups) -> Nee
     Needed {
         fields: [blocked.then_some(FieldKind::Occlusion), radiance.then_some(FieldKind::Radiance)],
         lamp_colors: seen().any(|e| scene.entities[e].emits && method(e).has_colors(&scene.meshes[mesh])),
-        silhouette: (casts && sharp && seen().any(|e| scene.entities[e].occludes)) || shines(LightMethod::Outline),
+        silhouette: (casts && sharp && seen().any(|e| scene.entities[e].occludes && !scene.casts_as_box(e)))
+            || shines(LightMethod::Outline),
     }
 }
 

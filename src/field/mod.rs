@@ -1,6 +1,7 @@
 //! A baked field: its sample points ([`lattice`]), its stored numbers, and its file ([`mod@file`]).
 
 pub mod area;
+pub mod cuboid;
 mod directions;
 pub mod file;
 pub mod fit;

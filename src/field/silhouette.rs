@@ -376,7 +376,7 @@ pub fn through_box(corners: [DVec3; 2], point: DVec3, direction: DVec3) -> Optio
 /// nothing. Its nearest point may lie off the ray, as of a wide thin slab below the receiver, and the object then
 /// stands where the ray passes its box: all of it, where the ray enters and leaves the box between receiver and limit,
 /// with a ramp where the box reaches beyond either.
-fn counts_between(away: f64, limit: f64, [enters, leaves]: [f64; 2]) -> f64 {
+pub(super) fn counts_between(away: f64, limit: f64, [enters, leaves]: [f64; 2]) -> f64 {
     let apart = leaves < TOUCHING || enters > limit - TOUCHING;
     let stands = away.max(enters).min(leaves);
     let within = |beyond: f64| (1.0 - beyond / NEAREST).clamp(0.0, 1.0);

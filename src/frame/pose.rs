@@ -7,11 +7,11 @@ use crate::field::sheet::{Rectangle, Sheet};
 use crate::field::sub_light::LampFace;
 use crate::field::{Area, Fit};
 use crate::layout::{self, CLUSTER_VERTICES, NONE};
-use crate::lists::gather::{ClusterBounds, EntityBounds, OutlineView, SceneBounds};
+use crate::lists::gather::{ClusterBounds, EntityBounds, OutlineShape, OutlineView, SceneBounds};
 use crate::lists::incremental::{Member, State};
 use crate::lists::sight::TriangleRun;
-use crate::scene::{Entity, LightMethod, Placement};
-use crate::scene_buffers::{self, FieldSlot};
+use crate::scene::{LightMethod, Placement};
+use crate::scene_buffers::{self, CuboidSlot, FieldSlot};
 use crate::sh::rotation::turns;
 use glam::DVec3;
 use std::f64::consts::PI;
@@ -38,15 +38,16 @@ impl Frame {
 
     /// Outlines of all entities, if any light is sharp.
     fn outlines_at(&self, placements: &[Placement]) -> Vec<Option<OutlineView>> {
-        let outline = |(entity, placement): (&Entity, &Placement)| {
-            let slot = self.buffers.meshes[entity.mesh].silhouette.as_ref().filter(|_| entity.occludes)?;
-            Some(OutlineView {
-                field: slot.field.clone(),
-                to_object: placement.turn().inverse(),
-                opaque: entity.opacity >= 1.0,
-            })
+        let outline = |(index, placement): (usize, &Placement)| {
+            let entity = &self.scene.entities[index];
+            let shape = match (self.cuboid(index), &self.buffers.meshes[entity.mesh].silhouette) {
+                (Some(slot), _) => OutlineShape::Cuboid(slot.cuboid),
+                (_, Some(slot)) if entity.occludes => OutlineShape::Maps(slot.field.clone()),
+                _ => return None,
+            };
+            Some(OutlineView { shape, to_object: placement.turn().inverse(), opaque: entity.opacity >= 1.0 })
         };
-        let all = || self.scene.entities.iter().zip(placements).map(outline).collect();
+        let all = || placements.iter().enumerate().map(outline).collect();
         self.sharp.as_ref().map_or(Vec::new(), |_| all())
     }
 
@@ -68,7 +69,10 @@ impl Frame {
             radius_m: device_mesh.radius_m * f64::from(placement.scale),
             reflectance: entity.reflection().map_or(f64::from(entity.albedo.max_element()), |_| 1.0),
             occludes: entity.occludes
-                && (holds(&device_mesh.blocked) || device_mesh.silhouette.is_some() || device_mesh.rectangle.is_some()),
+                && (holds(&device_mesh.blocked)
+                    || device_mesh.silhouette.is_some()
+                    || device_mesh.rectangle.is_some()
+                    || (self.sharp.is_some() && self.cuboid(index).is_some())),
             emits: entity.emits && (sharp || holds(source)),
             sharp,
             coloured,
@@ -127,7 +131,10 @@ impl Frame {
             area_x: area_x.extend(terms[0]).to_array(),
             area_y: area_y.extend(terms[1]).to_array(),
             area_terms: [terms[2], terms[3], terms[4], terms[5]],
-            silhouette: device_mesh.silhouette.as_ref().map_or(0, |slot| slot.first_quad),
+            silhouette: match (self.cuboid(index), &device_mesh.silhouette) {
+                (Some(slot), _) => slot.first_quad,
+                (None, slot) => slot.as_ref().map_or(0, |slot| slot.first_quad),
+            },
             light_kind: method.kind() as u32,
             light_size: light_size as f32,
             light_ratio: light_ratio as f32,
@@ -153,7 +160,13 @@ impl Frame {
         let entity = &self.scene.entities[index];
         let device_mesh = &self.buffers.meshes[entity.mesh];
         let blocks = device_mesh.rectangle.is_some() || device_mesh.blocked.is_some();
-        entity.occludes && (blocks || device_mesh.silhouette.is_some())
+        entity.occludes && (blocks || device_mesh.silhouette.is_some() || self.cuboid(index).is_some())
+    }
+
+    /// The box as which an entity blocks sharp lights.
+    pub(super) fn cuboid(&self, index: usize) -> Option<CuboidSlot> {
+        let slot = self.buffers.meshes[self.scene.entities[index].mesh].cuboid;
+        slot.filter(|_| self.scene.casts_as_box(index))
     }
 
     /// The rectangle that an entity is in the world, if its mesh is one.

@@ -185,6 +185,7 @@ impl FrameTwin<'_> {
             rotation: object.rotation,
             radius_m: object.radius_m,
             silhouette: device_mesh.silhouette.as_ref().map(|slot| &*slot.field),
+            cuboid: self.frame.cuboid(index).map(|slot| slot.cuboid),
             sheet: object.sheet,
             opacity: object.opacity,
         }
@@ -210,7 +211,10 @@ impl FrameTwin<'_> {
         };
         let lights: Vec<SharpLight<'_>> =
             self.sharp_lights.iter().filter(|l| **l != receiver.index).map(light).collect();
-        let has_edge = |j: &usize| outlines[*j].silhouette.is_some() || outlines[*j].sheet.is_some();
+        let has_edge = |j: &usize| {
+            let SharpObject { silhouette, cuboid, sheet, .. } = &outlines[*j];
+            silhouette.is_some() || cuboid.is_some() || sheet.is_some()
+        };
         let occluders: Vec<usize> = receiver.occluders.iter().copied().filter(has_edge).collect();
         let self_maps = &self.frame.buffers.surface(receiver.index).self_maps;
         let twin = SharpTwin {

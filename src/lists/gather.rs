@@ -12,7 +12,9 @@
 
 pub use crate::layout::GROUP_CLUSTERS;
 use crate::layout::{self, ListEntry};
-pub use crate::lists::scene_bounds::{ClusterBounds, EntityBounds, ListLight, OutlineView, SceneBounds, distance_key};
+pub use crate::lists::scene_bounds::{
+    ClusterBounds, EntityBounds, ListLight, OutlineShape, OutlineView, SceneBounds, distance_key,
+};
 use crate::lists::scope::{CullResult, Scope, SphereView};
 
 /// Whether clusters are as near one another as neighbours on a surface are, so that they make a group: a space-filling
@@ -81,13 +83,22 @@ pub fn gather(scope: &Scope<'_>, candidates: &Candidates, out: &mut Vec<u32>) ->
             let occluders = candidates.occluders.iter().zip(views.iter().zip(results));
             let listed = occluders
                 .filter(|(j, (_, result))| light != Some(**j) && chosen(**j) && **result == CullResult::Listed);
+            let start = out.len();
             for (&entity, (view, _)) in listed {
+                if sharp && scope.scene().is_cuboid(entity as usize) {
+                    out.push(ListEntry::Cuboid { entity, light }.pack());
+                    continue;
+                }
                 if view.is_sheet() {
                     out.push(ListEntry::Sheet { entity, light }.pack());
                     continue;
                 }
                 out.extend((view.whole || sharp).then(|| ListEntry::Occlude { entity, light }.pack()));
                 out.extend((view.cap && !sharp).then(|| ListEntry::Cap { entity, light }.pack()));
+            }
+            // Those of one kind are evaluated one after another.
+            if sharp {
+                out[start..].sort_by_key(|entry| ListEntry::kind(*entry));
             }
         };
     let mut results = Vec::with_capacity(views.len());

@@ -1,5 +1,6 @@
 //! Bounds of clusters, entities and lights at one time, from which cluster lists are made.
 
+use crate::field::cuboid::Cuboid;
 use crate::field::sheet::Sheet;
 use crate::field::silhouette::SilhouetteField;
 use crate::field::visibility_volume::SceneVolume;
@@ -87,10 +88,17 @@ pub struct EntityBounds {
     pub sheet: Option<Sheet>,
 }
 
+/// What tells the outline of an occluder.
+#[derive(Clone)]
+pub enum OutlineShape {
+    Maps(Arc<SilhouetteField>),
+    Cuboid(Cuboid),
+}
+
 /// The outline of an occluder at one time.
 #[derive(Clone)]
 pub struct OutlineView {
-    pub field: Arc<SilhouetteField>,
+    pub shape: OutlineShape,
     /// Rotation from the world to the object.
     pub to_object: DQuat,
     /// Whether no light passes within it.
@@ -116,7 +124,7 @@ pub struct SceneBounds {
     pub entities: Vec<EntityBounds>,
     /// Their bounding spheres: centre in the world and radius, metres.
     pub spheres: Vec<[f32; 4]>,
-    /// Outlines of those that have a silhouette field, by entity; empty where no light is sharp.
+    /// Outlines of those that have one, by entity; empty where no light is sharp.
     pub outlines: Vec<Option<OutlineView>>,
     pub tree: Tree,
     pub occluders: Vec<u32>,
@@ -136,6 +144,12 @@ pub struct SceneBounds {
 }
 
 impl SceneBounds {
+    /// Whether an occluder's outline is that of a box.
+    pub fn is_cuboid(&self, entity: usize) -> bool {
+        let outline = self.outlines.get(entity).and_then(Option::as_ref);
+        outline.is_some_and(|outline| matches!(outline.shape, OutlineShape::Cuboid(_)))
+    }
+
     /// Sorts `entities` for the lists.
     pub fn new(entities: Vec<EntityBounds>, sky: Option<f64>, skip: Skip, eps: f64) -> Self {
         let sphere = |entity: &EntityBounds| entity.centre.as_vec3().extend(entity.radius_m as f32).to_array();

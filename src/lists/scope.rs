@@ -10,7 +10,7 @@ use crate::field::sub_light::NEAR_LIGHT_STEPS;
 use crate::field::visibility_volume::SceneVolume;
 use crate::layout;
 use crate::layout::{COSINE_LOBE, EVERYTHING};
-use crate::lists::scene_bounds::{ClusterBounds, EntityBounds, ListLight, SceneBounds};
+use crate::lists::scene_bounds::{ClusterBounds, EntityBounds, ListLight, OutlineShape, SceneBounds};
 use crate::lists::skip::{CAP_SINES, SKIP_FADE_RAD};
 use crate::lists::tree::Crowd;
 use glam::{DVec2, DVec3};
@@ -354,13 +354,14 @@ impl<'m> Scope<'m> {
             |way: f64| self.radius_m + (f64::from(light_radius) - self.radius_m) * (way / distance).clamp(0.0, 1.0);
         let along = (centre - self.centre).dot(toward);
         let clear = width(along - radius_m).max(width(along + radius_m)) / radius_m + OUTLINE_MARGIN;
-        // Maps hold no larger distance.
-        if clear > REACH {
-            return CullResult::Listed;
-        }
-        let near =
-            outline.field.near(outline.to_object * (self.centre - centre) / radius_m, outline.to_object * toward);
-        let found = outline.field.outline(&near, Side::Whole, outline.to_object * toward).distance;
+        let point = outline.to_object * (self.centre - centre) / radius_m;
+        let ray = outline.to_object * toward;
+        let found = match &outline.shape {
+            // Maps hold no larger distance.
+            OutlineShape::Maps(_) if clear > REACH => return CullResult::Listed,
+            OutlineShape::Maps(field) => field.outline(&field.near(point, ray), Side::Whole, ray).distance,
+            OutlineShape::Cuboid(cuboid) => cuboid.ray(point, ray).nearest().0,
+        };
         // An object covers a light only if all of it lies between.
         let between = along - INSIDE[1] * radius_m - self.radius_m > 0.0
             && distance - along - INSIDE[1] * radius_m - f64::from(light_radius) > 0.0;

@@ -254,6 +254,12 @@ impl Scene {
         self.casters.get(&mesh).unwrap_or(&self.meshes[mesh])
     }
 
+    /// Whether an entity blocks sharp lights as a box in closed form: a lamp's own outline is that of its silhouettes.
+    pub(crate) fn casts_as_box(&self, entity: usize) -> bool {
+        let Entity { mesh, occludes, emits, .. } = self.entities[entity];
+        occludes && !emits && self.caster(mesh).cuboid().is_some()
+    }
+
     /// The mesh of an entity as it is lit and drawn: its own, or a finer one of the same shape.
     pub fn surface(&self, entity: usize) -> &Arc<Mesh> {
         self.surfaces.get(entity).unwrap_or_else(|| &self.meshes[self.entities[entity].mesh])

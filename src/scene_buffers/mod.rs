@@ -27,7 +27,8 @@ use crate::scene::{Lights, MapIndices, Scene};
 use field_atlas::FieldAtlas;
 pub use field_atlas::FieldSlot;
 use glam::DVec3;
-pub use silhouettes::{ColorsSlot, SilhouetteSlot, Silhouettes};
+use silhouettes::MeshSlots;
+pub use silhouettes::{ColorsSlot, CuboidSlot, SilhouetteSlot, Silhouettes};
 use std::ops::Range;
 use std::sync::Arc;
 
@@ -39,6 +40,8 @@ pub struct DeviceMesh {
     pub radiance: Option<FieldSlot>,
     /// Silhouette field, if an entity needs one.
     pub silhouette: Option<SilhouetteSlot>,
+    /// The box that it is, if it is one.
+    pub cuboid: Option<CuboidSlot>,
     /// Its colours, if it is a lamp with colours of its parts.
     pub lamp_colors: Option<ColorsSlot>,
     /// The rectangle that blocks in place of fields, if the mesh is one.
@@ -155,10 +158,11 @@ impl SceneBuffers {
         let volume = baked.volume.as_ref().map(|volume| &*volume.volume);
         let FieldAtlas { fields, slots, volume_first } =
             field_atlas::field_atlas(device, scene, &baked.meshes, volume, options)?;
-        let (silhouettes, outlines) = Silhouettes::new(device, &baked.meshes)?;
+        let cuboids: Vec<_> = (0..scene.meshes.len()).map(|mesh| scene.caster(mesh).cuboid()).collect();
+        let (silhouettes, outlines) = Silhouettes::new(device, &baked.meshes, &cuboids)?;
         let casters = (0..scene.meshes.len()).map(|mesh| scene.caster(mesh));
-        let meshes =
-            casters.zip(slots).zip(outlines).map(|((caster, [blocked, radiance]), (silhouette, lamp_colors))| {
+        let meshes = casters.zip(slots).zip(outlines).map(
+            |((caster, [blocked, radiance]), MeshSlots { silhouette, cuboid, lamp_colors })| {
                 let (centre, radius_m) = caster.bounding_sphere();
                 let rectangle = caster.rectangle();
                 let radius_m = f64::from(radius_m);
@@ -166,12 +170,14 @@ impl SceneBuffers {
                     blocked,
                     radiance,
                     silhouette,
+                    cuboid,
                     lamp_colors,
                     rectangle,
                     centre_m: centre.as_dvec3(),
                     radius_m,
                 }
-            });
+            },
+        );
         let meshes = meshes.collect();
         // The vertices are reserved at once. Growing by halves would hold up to three times as much.
         let quads = 2 * baked.surfaces.iter().map(|surface| surface.mesh.positions.len()).sum::<usize>();

@@ -1,8 +1,9 @@
-//! All silhouette fields of a scene in two buffers, and where each begins; and the colours of its lamps.
+//! All silhouette fields and boxes of a scene in two buffers, and where each begins; and the colours of its lamps.
 
 use super::ALIGNMENT;
 use crate::bake::BakedMesh;
 use crate::error::Result;
+use crate::field::cuboid::Cuboid;
 use crate::field::lamp_colors::LampColors;
 use crate::field::silhouette::SilhouetteField;
 use crate::gpu::{Buffer, Device};
@@ -12,7 +13,7 @@ use std::sync::Arc;
 
 /// The silhouette fields of a scene. Where it has none, the buffers hold a little of nothing.
 pub struct Silhouettes {
-    /// Two quads a field and three a node, then the colours of lamps, see
+    /// Two quads a field and three a node, then three of each box, then the colours of lamps, see
     /// `glsl/silhouette_field.glsl`.
     pub nodes: Buffer,
     /// Two words a cell.
@@ -27,6 +28,14 @@ pub struct SilhouetteSlot {
     pub field: Arc<SilhouetteField>,
 }
 
+/// A mesh that is a box.
+#[derive(Clone, Copy)]
+pub struct CuboidSlot {
+    /// The first of its three quads.
+    pub first_quad: u32,
+    pub cuboid: Cuboid,
+}
+
 /// The colours of a mesh that is a lamp ([`crate::field::lamp_colors`]).
 #[derive(Clone)]
 pub struct ColorsSlot {
@@ -35,13 +44,21 @@ pub struct ColorsSlot {
     pub colors: Arc<LampColors>,
 }
 
-/// Where the silhouette field and the colours of a mesh lie.
-pub type MeshSlots = (Option<SilhouetteSlot>, Option<ColorsSlot>);
+/// Where that of a mesh lies which sharp lights read.
+pub struct MeshSlots {
+    pub silhouette: Option<SilhouetteSlot>,
+    pub cuboid: Option<CuboidSlot>,
+    pub lamp_colors: Option<ColorsSlot>,
+}
 
 impl Silhouettes {
-    /// Uploads the fields of a scene's meshes, and returns each mesh's place. Meshes that share a field share its
-    /// place.
-    pub fn new(device: &Arc<Device>, baked: &[BakedMesh]) -> Result<(Self, Vec<MeshSlots>)> {
+    /// Uploads the fields of a scene's meshes and the boxes that they are, and returns each mesh's place. Meshes that
+    /// share a field share its place.
+    pub fn new(
+        device: &Arc<Device>,
+        baked: &[BakedMesh],
+        cuboids: &[Option<Cuboid>],
+    ) -> Result<(Self, Vec<MeshSlots>)> {
         let mut nodes = Vec::<[f32; 4]>::new();
         let mut cells = Vec::<[u32; 2]>::new();
         let mut known = HashMap::<*const SilhouetteField, u32>::new();
@@ -55,7 +72,13 @@ impl Silhouettes {
             let halves = if field.has_halves() { HAS_HALVES } else { 0 };
             SilhouetteSlot { first_quad: first_quad | halves, field: field.clone() }
         };
-        let outlines: Vec<_> = baked.iter().map(|mesh| mesh.silhouette.as_ref().map(&mut slot)).collect();
+        let silhouettes: Vec<_> = baked.iter().map(|mesh| mesh.silhouette.as_ref().map(&mut slot)).collect();
+        let mut cuboid_slot = |cuboid: &Cuboid| {
+            let first_quad = nodes.len() as u32;
+            nodes.extend(cuboid.quads());
+            CuboidSlot { first_quad, cuboid: *cuboid }
+        };
+        let cuboids: Vec<_> = cuboids.iter().map(|cuboid| cuboid.as_ref().map(&mut cuboid_slot)).collect();
         let mut known_colors = HashMap::<*const LampColors, u32>::new();
         let mut colors_slot = |colors: &Arc<LampColors>| {
             let first_quad = *known_colors.entry(Arc::as_ptr(colors)).or_insert_with(|| {
@@ -66,7 +89,9 @@ impl Silhouettes {
             ColorsSlot { first_quad, colors: colors.clone() }
         };
         let colors = baked.iter().map(|mesh| mesh.lamp_colors.as_ref().map(&mut colors_slot));
-        let slots = outlines.into_iter().zip(colors).collect();
+        let slots = silhouettes.into_iter().zip(cuboids).zip(colors);
+        let slots = slots.map(|((silhouette, cuboid), lamp_colors)| MeshSlots { silhouette, cuboid, lamp_colors });
+        let slots = slots.collect();
         nodes.resize(nodes.len().max(ALIGNMENT as usize / 16), [0.0; 4]);
         cells.resize(cells.len().max(ALIGNMENT as usize / 8), [0; 2]);
         let nodes = Buffer::with_data(device, "silhouette nodes", &nodes)?;

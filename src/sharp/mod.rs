@@ -10,6 +10,7 @@ pub mod twin;
 
 use crate::bake::silhouette::SilhouetteOptions;
 use crate::error::Result;
+use crate::field::cuboid::PARALLEL;
 use crate::field::lamp_colors::{SHELL_STEP, SHELLS};
 use crate::field::lattice::CELL_WARP;
 use crate::field::sheet::{BEYOND as BEYOND_SHEET, CONTACT};
@@ -67,6 +68,8 @@ pub struct SharpPermutation {
     pub boxes: bool,
     /// Whether any mesh is a sheet.
     pub sheets: bool,
+    /// Whether any occluder is a box.
+    pub cuboids: bool,
     /// Whether any lit mesh can shadow itself.
     pub self_shadows: bool,
     /// Whether the shares of lights whose highlights are shown are kept.
@@ -118,6 +121,7 @@ impl SharpPermutation {
             .define("HALVES", self.halves)
             .define("BOXES", self.boxes)
             .define("SHEETS", self.sheets)
+            .define("CUBOIDS", self.cuboids)
             .define("SELF", self.self_shadows)
             .define("CONES", self.cones)
             .define("EDGES", self.edges)
@@ -129,6 +133,7 @@ impl SharpPermutation {
         let numbers = [
             ("REACH", REACH),
             ("NEAREST", NEAREST),
+            ("PARALLEL", PARALLEL),
             ("NO_BOX", NO_BOX),
             ("SHELL_STEP", SHELL_STEP),
             ("LAST_SHELL", (SHELLS - 1) as f64),

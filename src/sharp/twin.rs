@@ -1,5 +1,6 @@
 //! The CPU twin of "sharp", in f64 and vertex by vertex, from the same stored numbers.
 
+use crate::field::cuboid::Cuboid;
 use crate::field::lamp_colors::{LampColors, color_at};
 use crate::field::self_visibility::{self, BYTES};
 use crate::field::sheet::{BEYOND, Sheet, SheetEye, SheetShadow};
@@ -19,6 +20,8 @@ pub struct SharpObject<'f> {
     /// Bounding radius after scaling, metres.
     pub radius_m: f64,
     pub silhouette: Option<&'f SilhouetteField>,
+    /// The box that blocks in place of an outline.
+    pub cuboid: Option<Cuboid>,
     /// The rectangle that blocks in place of an outline.
     pub sheet: Option<Sheet>,
     /// Share of light that it keeps back where it blocks.
@@ -96,6 +99,7 @@ impl SharpTwin<'_> {
         let between = |j: &&usize| **j != light.entity && !(self.leaves)(v, **j, light.entity);
         let between = self.occluders.iter().filter(between).map(|&j| &self.objects[j]);
         let (sheets, occluders): (Vec<&SharpObject<'_>>, Vec<_>) = between.partition(|object| object.sheet.is_some());
+        let (cuboids, occluders): (Vec<_>, Vec<_>) = occluders.into_iter().partition(|object| object.cuboid.is_some());
         let receiver = &self.objects[self.receiver];
         let eye =
             SheetEye { position: point.position, normal: point.normal, receiver: (receiver.centre, receiver.radius_m) };
@@ -126,6 +130,15 @@ impl SharpTwin<'_> {
                 let through: f64 = pairs
                     .map(|(object, near)| 1.0 - object.opacity * blocked(object, near, part, part.distance))
                     .product();
+                let past_cuboid = |object: &&SharpObject<'_>| {
+                    let local = |v: DVec3| object.rotation.inverse() * v;
+                    let point = local(point.position - object.centre) / object.radius_m;
+                    let distance = part.distance / object.radius_m;
+                    let blocked =
+                        object.cuboid.map(|cuboid| cuboid.blocked(point, local(part.toward), distance, part.tangent()));
+                    1.0 - object.opacity * blocked.unwrap_or(0.0)
+                };
+                let past_cuboids: f64 = cuboids.iter().map(past_cuboid).product();
                 let past_sheets = sheets.iter().fold(SheetShadow::NONE, |shadow, (sheet, opacity)| {
                     let slope = sheet.slope(seen.facing().unwrap_or(part.toward));
                     let least_m = BEYOND * seen.sine * seen.distance;
@@ -146,7 +159,7 @@ impl SharpTwin<'_> {
                         part.distance / receiver.radius_m,
                     )
                 });
-                part.share(point.normal) * sees * covers * through * past_sheets.free * color(part)
+                part.share(point.normal) * sees * covers * through * past_cuboids * past_sheets.free * color(part)
             };
             parts.iter().map(part).sum()
         };

@@ -46,6 +46,7 @@ const uint ENTRY_CAP = 1u;    // an occluder as a cap
 const uint ENTRY_SHEET = 2u;  // an occluder that is a sheet
 const uint ENTRY_VOLUME = 3u; // all that rests
 const uint ENTRY_CUBOID = 4u; // an occluder that is a box, before a sharp light
+const uint ENTRY_GLOBE = 5u;  // a closed surface around a sharp light
 
 bool is_kind(uint packed, uint kind) {
     return (packed & (ENTRY_LIGHT | 7u << ENTRY_CHANNEL)) == kind << ENTRY_CHANNEL;

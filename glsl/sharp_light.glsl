@@ -501,6 +501,18 @@ vec3 chain_sum(Surface surface, Entity shining, bool open, uint first, uint coun
                 }
             } while (is_kind(packed, ENTRY_CUBOID) && j < count);
 #endif
+#if GLOBES
+            do {
+                if (is_kind(packed, ENTRY_GLOBE)) {
+                    share *= 1.0 - ENTITY(packed & SKY_CHAIN).opacity;
+#if FINDS_STATES
+                    near_occluders |= occluder_bit(packed & SKY_CHAIN);
+#endif
+                    j = next_entry(surface, first, count, j + 1, true);
+                    packed = entry_at(first + j);
+                }
+            } while (is_kind(packed, ENTRY_GLOBE) && j < count);
+#endif
 #if EDGES
             hidden = hidden && covered;
 #endif

@@ -274,6 +274,8 @@ pub enum ListEntry {
     Sheet { entity: u32, light: Option<u32> },
     /// As [`ListEntry::Occlude`], of a box before a sharp light.
     Cuboid { entity: u32, light: Option<u32> },
+    /// As [`ListEntry::Occlude`], of a closed surface around a sharp light.
+    Globe { entity: u32, light: Option<u32> },
     /// Multiply the sky's chain by the visibility past all that rests, from where it began; it names its receiver.
     Volume { receiver: u32 },
     /// Meet a light; `channel` is `None` for a light of one colour, which shares the occlusion field.
@@ -312,6 +314,7 @@ impl ListEntry {
             ListEntry::Sheet { entity, light } => occlude(entity, light, 2),
             ListEntry::Volume { receiver } => occlude(receiver, None, 3),
             ListEntry::Cuboid { entity, light } => occlude(entity, light, 4),
+            ListEntry::Globe { entity, light } => occlude(entity, light, 5),
             ListEntry::Shine { entity, channel, last } => {
                 let flags = 1 | channel.unwrap_or(3) << 1 | u32::from(last) << 3;
                 entity | entity << ENTRY_BITS | flags << (2 * ENTRY_BITS)

@@ -343,6 +343,13 @@ impl Mesh {
         Mesh { panel: Some(panel), ..self }
     }
 
+    /// Whether a point is within the mesh, which is closed.
+    pub(crate) fn holds(&self, point: DVec3) -> bool {
+        let [low, high] = self.extent().map(|corner| corner.as_dvec3());
+        let in_box = point.cmpge(low).all() && point.cmple(high).all();
+        in_box && topology::winding(&self.positions, &self.triangles, point).abs() > 0.5
+    }
+
     /// Signed volume in cubic metres, positive for a closed mesh wound outwards; of no meaning for an open one.
     pub fn volume_m3(&self) -> f64 {
         topology::volume_m3(&self.positions, &self.triangles, self.centre)

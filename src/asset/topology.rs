@@ -72,6 +72,17 @@ pub fn volume_m3(positions: &[Vec3], triangles: &[[u32; 3]], centre: Vec3) -> f6
     triangles.iter().map(|triangle| tetrahedron_m3(positions, triangle, centre)).sum()
 }
 
+/// How often a closed surface winds around a point: the solid angle that its triangles fill as seen from there, over that
+/// of a whole view (Van Oosterom and Strackee, *The Solid Angle of a Plane Triangle*, 1983).
+pub fn winding(positions: &[Vec3], triangles: &[[u32; 3]], point: DVec3) -> f64 {
+    let half_angle = |triangle: &[u32; 3]| {
+        let [a, b, c] = triangle.map(|i| positions[i as usize].as_dvec3() - point);
+        let [x, y, z] = [a.length(), b.length(), c.length()];
+        a.dot(b.cross(c)).atan2(x * y * z + a.dot(b) * z + b.dot(c) * x + c.dot(a) * y)
+    };
+    triangles.iter().map(half_angle).sum::<f64>() / std::f64::consts::TAU
+}
+
 fn tetrahedron_m3(positions: &[Vec3], triangle: &[u32; 3], centre: Vec3) -> f64 {
     let [a, b, c] = triangle.map(|i| positions[i as usize].as_dvec3() - centre.as_dvec3());
     a.dot(b.cross(c)) / 6.0
@@ -267,4 +278,18 @@ fn plane(positions: &[Vec3], radius_m: f64) -> Option<DVec3> {
     let c = most(&|p| (p - a).cross(b - a).length_squared());
     let normal = (b - a).cross(c - a).try_normalize()?;
     positions.iter().all(|p| normal.dot(p.as_dvec3() - a).abs() <= FLAT_TOLERANCE * radius_m).then_some(normal)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::asset::generate::torus;
+
+    #[test]
+    fn a_closed_surface_winds_once_around_what_it_holds() {
+        let ring = torus(1.0, 0.3, 24, 12);
+        let around = |point: [f64; 3]| winding(&ring.positions, &ring.triangles, DVec3::from_array(point));
+        assert!((around([1.0, 0.0, 0.1]) - 1.0).abs() < 1e-9);
+        assert!(around([0.0; 3]).abs() < 1e-9 && around([2.0, 0.1, 0.3]).abs() < 1e-9);
+    }
 }

@@ -61,6 +61,7 @@ pub(super) fn sharp(
         boxes: any_field(SilhouetteField::has_box),
         sheets: merge.sheets,
         cuboids: (0..scene.entities.len()).any(|entity| scene.casts_as_box(entity)),
+        globes: (0..scene.entities.len()).any(|entity| scene.is_globe(entity)),
         gloss: merge.gloss,
         self_shadows: buffers.has_self_shadows(),
         cones: lights.len() > 1 || casters > FEW_CASTERS,

@@ -7,7 +7,7 @@ use crate::field::sheet::{Rectangle, Sheet};
 use crate::field::sub_light::LampFace;
 use crate::field::{Area, Fit};
 use crate::layout::{self, CLUSTER_VERTICES, NONE};
-use crate::lists::gather::{ClusterBounds, EntityBounds, OutlineShape, OutlineView, SceneBounds};
+use crate::lists::gather::{ClusterBounds, EntityBounds, Globe, OutlineShape, OutlineView, SceneBounds};
 use crate::lists::incremental::{Member, State};
 use crate::lists::sight::TriangleRun;
 use crate::scene::{LightMethod, Placement};
@@ -28,6 +28,7 @@ impl Frame {
             entities: placements.iter().enumerate().map(|(index, p)| self.entity(index, p)).collect(),
             scene_bounds: SceneBounds {
                 outlines: self.outlines_at(placements),
+                globes: self.globes_at(placements),
                 groups: Some(self.groups.clone()),
                 volume: self.buffers.volume.clone(),
                 ..SceneBounds::new(bounds, sky, self.options.skip, eps)
@@ -49,6 +50,28 @@ impl Frame {
         };
         let all = || placements.iter().enumerate().map(outline).collect();
         self.sharp.as_ref().map_or(Vec::new(), |_| all())
+    }
+
+    /// Globes of glass and the sharp lights within.
+    fn globes_at(&self, placements: &[Placement]) -> Vec<Globe> {
+        let count = self.scene.entities.len();
+        let shines = |light: &usize| self.scene.entities[*light].emits && self.light_method(*light).is_sharp();
+        let of_globe = |occluder: usize| {
+            let mesh = self.scene.caster(self.scene.entities[occluder].mesh);
+            let placement = placements[occluder];
+            let is_within = move |light: &usize| {
+                let place = self.centre(*light, &placements[*light]);
+                *light != occluder && mesh.holds(placement.local(place))
+            };
+            let globe = move |light: usize| Globe {
+                occluder: occluder as u32,
+                light: light as u32,
+                mesh: mesh.clone(),
+                placement,
+            };
+            (0..count).filter(shines).filter(is_within).map(globe)
+        };
+        (0..count).filter(|&occluder| self.scene.is_globe(occluder)).flat_map(of_globe).collect()
     }
 
     fn entity_bounds(&self, index: usize, placement: &Placement) -> EntityBounds {

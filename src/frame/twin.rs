@@ -6,7 +6,7 @@ use crate::error::Result;
 use crate::field::{Area, ShadowField, self_visibility};
 use crate::gpu::Buffer;
 use crate::layout::{CLUSTER_VERTICES, Cluster, ENTRY_ENTITIES, ListEntry};
-use crate::lists::gather::{self, Candidates};
+use crate::lists::gather::{self, Candidates, Globe};
 use crate::lists::incremental::{ClusterLists, State};
 use crate::lists::scope::Scope;
 use crate::merge::twin::{MergeObject, MergeTwin};
@@ -72,6 +72,7 @@ impl Frame {
             receivers,
             lights: self.lights(|method| !method.is_sharp()),
             sharp_lights: self.lights(LightMethod::is_sharp),
+            globes: state.scene_bounds.globes,
             sky: self.scene.environment.coefficients(self.options.bake.bands),
         })
     }
@@ -86,6 +87,7 @@ struct FrameTwin<'f> {
     receivers: Vec<Receiver>,
     lights: Vec<usize>,
     sharp_lights: Vec<usize>,
+    globes: Vec<Globe>,
     sky: [Vec<f64>; 3],
 }
 
@@ -217,6 +219,12 @@ impl FrameTwin<'_> {
         };
         let occluders: Vec<usize> = receiver.occluders.iter().copied().filter(has_edge).collect();
         let self_maps = &self.frame.buffers.surface(receiver.index).self_maps;
+        let point = |(position, normal): (&DVec3, &DVec3)| SurfacePoint {
+            position: object.centre + object.rotation * (*position * object.scale),
+            normal: object.rotation * *normal,
+            own_normal: *normal,
+        };
+        let points: Vec<SurfacePoint> = receiver.positions.iter().zip(&receiver.normals).map(point).collect();
         let twin = SharpTwin {
             objects: outlines,
             occluders: &occluders,
@@ -224,13 +232,12 @@ impl FrameTwin<'_> {
             self_maps: self_maps.as_deref().map(|maps| &maps[..]),
             lights: &lights,
             leaves: &|v, j, light| leaves(v, j, Some(light)),
+            encloses: &|v, j, light| {
+                let is_around = |globe: &&Globe| [globe.occluder, globe.light] == [j as u32, light as u32];
+                let globe = self.globes.iter().find(is_around);
+                globe.is_some_and(|globe| !globe.mesh.holds(globe.placement.local(points[v].position)))
+            },
         };
-        let point = |(position, normal): (&DVec3, &DVec3)| SurfacePoint {
-            position: object.centre + object.rotation * (*position * object.scale),
-            normal: object.rotation * *normal,
-            own_normal: *normal,
-        };
-        let points: Vec<SurfacePoint> = receiver.positions.iter().zip(&receiver.normals).map(point).collect();
         let albedo = self.frame.scene.entities[receiver.index].albedo.as_dvec3();
         for (to, from) in lit.iter_mut().zip(twin.run(&points)) {
             *to = (DVec3::from_array(*to) + albedo * from).to_array();

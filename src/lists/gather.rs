@@ -13,7 +13,7 @@
 pub use crate::layout::GROUP_CLUSTERS;
 use crate::layout::{self, ListEntry};
 pub use crate::lists::scene_bounds::{
-    ClusterBounds, EntityBounds, ListLight, OutlineShape, OutlineView, SceneBounds, distance_key,
+    ClusterBounds, EntityBounds, Globe, ListLight, OutlineShape, OutlineView, SceneBounds, distance_key,
 };
 use crate::lists::scope::{CullResult, Scope, SphereView};
 
@@ -73,7 +73,7 @@ pub fn gather(scope: &Scope<'_>, candidates: &Candidates, out: &mut Vec<u32>) ->
                 return CullResult::LeftOff;
             }
             match light.filter(|light| sharp && *light != occluder) {
-                Some(light) => scope.outline_result(occluder as usize, spheres[light as usize]),
+                Some(light) => scope.outline_result(occluder as usize, light),
                 None => CullResult::Listed,
             }
         }));
@@ -81,10 +81,14 @@ pub fn gather(scope: &Scope<'_>, candidates: &Candidates, out: &mut Vec<u32>) ->
     let occlude =
         |light: Option<u32>, sharp, chosen: &dyn Fn(u32) -> bool, results: &[CullResult], out: &mut Vec<u32>| {
             let occluders = candidates.occluders.iter().zip(views.iter().zip(results));
-            let listed = occluders
-                .filter(|(j, (_, result))| light != Some(**j) && chosen(**j) && **result == CullResult::Listed);
+            let is_listed = |result| matches!(result, CullResult::Listed | CullResult::Encloses);
+            let listed = occluders.filter(|(j, (_, result))| light != Some(**j) && chosen(**j) && is_listed(**result));
             let start = out.len();
-            for (&entity, (view, _)) in listed {
+            for (&entity, (view, result)) in listed {
+                if *result == CullResult::Encloses {
+                    out.push(ListEntry::Globe { entity, light }.pack());
+                    continue;
+                }
                 if sharp && scope.scene().is_cuboid(entity as usize) {
                     out.push(ListEntry::Cuboid { entity, light }.pack());
                     continue;

@@ -1,11 +1,13 @@
 //! Bounds of clusters, entities and lights at one time, from which cluster lists are made.
 
+use crate::asset::Mesh;
 use crate::field::cuboid::Cuboid;
 use crate::field::sheet::Sheet;
 use crate::field::silhouette::SilhouetteField;
 use crate::field::visibility_volume::SceneVolume;
 use crate::lists::skip::Skip;
 use crate::lists::tree::Tree;
+use crate::scene::Placement;
 use crate::scene::groups::Groups;
 use glam::{DQuat, DVec3, Vec3};
 use std::f64::consts::PI;
@@ -105,6 +107,15 @@ pub struct OutlineView {
     pub opaque: bool,
 }
 
+/// A closed surface that lets some light through and has a sharp light within, as a globe of glass around its lamp.
+#[derive(Clone)]
+pub struct Globe {
+    pub occluder: u32,
+    pub light: u32,
+    pub mesh: Arc<Mesh>,
+    pub placement: Placement,
+}
+
 /// A light as the gather sees it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ListLight {
@@ -126,6 +137,7 @@ pub struct SceneBounds {
     pub spheres: Vec<[f32; 4]>,
     /// Outlines of those that have one, by entity; empty where no light is sharp.
     pub outlines: Vec<Option<OutlineView>>,
+    pub globes: Vec<Globe>,
     pub tree: Tree,
     pub occluders: Vec<u32>,
     /// Those that shine, the sharp ones first, each in the order of entities.
@@ -174,6 +186,7 @@ impl SceneBounds {
             groups: None,
             volume: None,
             outlines: Vec::new(),
+            globes: Vec::new(),
             tree,
             occluders,
             lights,

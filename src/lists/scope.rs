@@ -10,7 +10,7 @@ use crate::field::sub_light::NEAR_LIGHT_STEPS;
 use crate::field::visibility_volume::SceneVolume;
 use crate::layout;
 use crate::layout::{COSINE_LOBE, EVERYTHING};
-use crate::lists::scene_bounds::{ClusterBounds, EntityBounds, ListLight, OutlineShape, SceneBounds};
+use crate::lists::scene_bounds::{ClusterBounds, EntityBounds, Globe, ListLight, OutlineShape, SceneBounds};
 use crate::lists::skip::{CAP_SINES, SKIP_FADE_RAD};
 use crate::lists::tree::Crowd;
 use glam::{DVec2, DVec3};
@@ -31,6 +31,8 @@ pub enum CullResult {
     LeftOff,
     /// It blocks every ray from the cluster to the sharp light, which is left off with its chain.
     Covers,
+    /// All rays from the cluster pass it once: it is a globe around the light.
+    Encloses,
 }
 
 /// An angle from 0 to pi as its cosine and sine. Sums beyond pi stay there.
@@ -337,12 +339,19 @@ impl<'m> Scope<'m> {
         self.is_enough(radiance * view.weight.min(light.weight))
     }
 
-    /// What becomes of an occluder whose cone meets that of a sharp light (centre in the world, radius). All rays from
+    /// What becomes of an occluder whose cone meets that of a sharp light. All rays from
     /// the cluster to the light stay within a cone around the ray between the two middles. Where the object's outline
     /// is farther from that ray than the cone is wide beside the object, all of them miss the object, or all of them
     /// meet it.
-    pub fn outline_result(&self, occluder: usize, [x, y, z, light_radius]: [f32; 4]) -> CullResult {
+    pub fn outline_result(&self, occluder: usize, light: u32) -> CullResult {
         let skip = self.scene.skip;
+        let [x, y, z, light_radius] = self.scene.spheres[light as usize];
+        let is_around = |globe: &&Globe| globe.occluder as usize == occluder && globe.light == light;
+        if let Some(Globe { mesh, placement, .. }) = self.scene.globes.iter().find(is_around)
+            && !mesh.holds(placement.local(self.centre))
+        {
+            return CullResult::Encloses;
+        }
         let Some(Some(outline)) = self.scene.outlines.get(occluder).filter(|_| skip.passed || skip.covered) else {
             return CullResult::Listed;
         };

@@ -260,6 +260,12 @@ impl Scene {
         occludes && !emits && self.caster(mesh).cuboid().is_some()
     }
 
+    /// Whether an entity is a closed surface that lets light through.
+    pub(crate) fn is_globe(&self, entity: usize) -> bool {
+        let Entity { mesh, transparent, occludes, .. } = self.entities[entity];
+        transparent && occludes && self.caster(mesh).is_closed()
+    }
+
     /// The mesh of an entity as it is lit and drawn: its own, or a finer one of the same shape.
     pub fn surface(&self, entity: usize) -> &Arc<Mesh> {
         self.surfaces.get(entity).unwrap_or_else(|| &self.meshes[self.entities[entity].mesh])

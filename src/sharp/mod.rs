@@ -70,6 +70,8 @@ pub struct SharpPermutation {
     pub sheets: bool,
     /// Whether any occluder is a box.
     pub cuboids: bool,
+    /// Whether anything may be a globe of glass around a lamp.
+    pub globes: bool,
     /// Whether any lit mesh can shadow itself.
     pub self_shadows: bool,
     /// Whether the shares of lights whose highlights are shown are kept.
@@ -122,6 +124,7 @@ impl SharpPermutation {
             .define("BOXES", self.boxes)
             .define("SHEETS", self.sheets)
             .define("CUBOIDS", self.cuboids)
+            .define("GLOBES", self.globes)
             .define("SELF", self.self_shadows)
             .define("CONES", self.cones)
             .define("EDGES", self.edges)

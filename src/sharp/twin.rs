@@ -53,6 +53,8 @@ pub struct SharpTwin<'t> {
     pub lights: &'t [SharpLight<'t>],
     /// Whether a vertex leaves out an occluder before a light, or the light itself where both are the same.
     pub leaves: &'t (dyn Fn(usize, usize, usize) -> bool + Sync),
+    /// Whether, to a vertex, an occluder is a globe around a light.
+    pub encloses: &'t (dyn Fn(usize, usize, usize) -> bool + Sync),
 }
 
 /// A vertex in the world.
@@ -97,7 +99,10 @@ impl SharpTwin<'_> {
             LightMethod::Harmonics => return DVec3::ZERO,
         };
         let between = |j: &&usize| **j != light.entity && !(self.leaves)(v, **j, light.entity);
-        let between = self.occluders.iter().filter(between).map(|&j| &self.objects[j]);
+        let (globes, between): (Vec<usize>, Vec<usize>) =
+            self.occluders.iter().filter(between).partition(|j| (self.encloses)(v, **j, light.entity));
+        let past_globes: f64 = globes.iter().map(|&j| 1.0 - self.objects[j].opacity).product();
+        let between = between.into_iter().map(|j| &self.objects[j]);
         let (sheets, occluders): (Vec<&SharpObject<'_>>, Vec<_>) = between.partition(|object| object.sheet.is_some());
         let (cuboids, occluders): (Vec<_>, Vec<_>) = occluders.into_iter().partition(|object| object.cuboid.is_some());
         let receiver = &self.objects[self.receiver];
@@ -163,6 +168,6 @@ impl SharpTwin<'_> {
             };
             parts.iter().map(part).sum()
         };
-        seen.over_parts(point.normal) * seen.blocks().into_iter().map(block).sum::<DVec3>()
+        past_globes * seen.over_parts(point.normal) * seen.blocks().into_iter().map(block).sum::<DVec3>()
     }
 }

@@ -83,6 +83,32 @@ fn no_light_comes_through_a_lamp_shade() {
     }
 }
 
+/// A globe of glass around a bulb takes its share once of all that leaves it, whether ball or box.
+#[test]
+fn glass_around_a_bulb_takes_its_share() {
+    let Some(stage) = stage() else { return };
+    let ball = generate::sphere(0.18, 3);
+    let lantern = generate::cuboid(Vec3::splat(0.3), 1);
+    for (name, glass) in [("ball", ball), ("lantern", lantern)] {
+        let scene = Scene::builder()
+            .camera(Camera::new([0.2, 0.8, 1.9], [0.0, 0.3, 0.0]))
+            .mesh("slab", generate::cuboid(Vec3::new(3.0, 0.1, 3.0), 1))
+            .mesh("glass", glass)
+            .mesh("bulb", Generator::Sphere { radius_m: 0.05, subdivisions: 2 })
+            .mesh("post", generate::cuboid(Vec3::new(0.06, 0.3, 0.06), 1))
+            .entity(EntityData { position: Vec3::new(0.0, -0.05, 0.0), ..EntityData::of_mesh("slab") })
+            .entity(EntityData { position: Vec3::new(0.4, 0.15, 0.1), ..EntityData::of_mesh("post") })
+            .entity(EntityData { position: Vec3::new(0.0, 0.4, 0.0), opacity: 0.4, ..EntityData::of_mesh("glass") })
+            .entity(EntityData {
+                position: Vec3::new(0.0, 0.4, 0.02),
+                emission: Vec3::splat(10.0),
+                ..EntityData::of_mesh("bulb")
+            });
+        let error = picture_error(&stage, &scene.build().unwrap());
+        assert!(error < 0.05, "{name}: {error}");
+    }
+}
+
 /// What one node carries looks as if it stood there at rest.
 #[test]
 fn what_is_carried_together_shades_itself_as_at_rest() {

@@ -157,7 +157,10 @@ float reach_of(SeenLight light, vec2 place, vec3 along) {
     vec3 one = (light.box[0] - point) * per_step, other = (light.box[1] - point) * per_step;
     vec3 first = min(one, other), last = max(one, other);
     float enters = max(max(first.x, first.y), first.z), leaves = min(min(last.x, last.y), last.z);
-    reach = enters < leaves ? max(reach, enters) : reach;
+    // One that misses the body passes it there, at the latest where it leaves the sphere.
+    float passes = clamp(0.5 * (enters + leaves), reach, light.distance * (1.0 + light.sine));
+    bool tells = light.box[0].x < light.box[1].x;
+    reach = tells ? max(reach, enters < leaves ? enters : passes) : reach;
 #endif
     return reach;
 }

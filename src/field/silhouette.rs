@@ -365,11 +365,16 @@ impl SilhouetteField {
 
 /// Where a ray enters and leaves a box, if it meets it.
 pub fn through_box(corners: [DVec3; 2], point: DVec3, direction: DVec3) -> Option<[f64; 2]> {
+    let ends = slabs(corners, point, direction);
+    (ends[0] <= ends[1]).then_some(ends)
+}
+
+/// Where a ray has entered all three slabs of a box and where it leaves the first, which is before that if it misses.
+pub(super) fn slabs(corners: [DVec3; 2], point: DVec3, direction: DVec3) -> [f64; 2] {
     let least = DVec3::splat(LEAST_STEP);
     let step = DVec3::select(direction.abs().cmplt(least), least, direction);
     let [one, other] = corners.map(|corner| (corner - point) / step);
-    let ends = [one.min(other).max_element(), one.max(other).min_element()];
-    (ends[0] <= ends[1]).then_some(ends)
+    [one.min(other).max_element(), one.max(other).min_element()]
 }
 
 /// How far an outline counts that lies that far away (in r): one behind the receiver or beyond the limit blocks

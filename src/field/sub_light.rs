@@ -194,12 +194,15 @@ impl SeenLight {
         SeenLight { boxed: Some((corners, rotation)), ..self }
     }
 
-    /// Where the box begins in a direction, as far as that meets it.
-    fn enters_box(&self, toward: DVec3) -> Option<f64> {
-        let (corners, rotation) = self.boxed?;
+    /// How far its body is in a direction in which its bounding sphere begins there: where the box does, or where a ray
+    /// passes that misses it, at the latest where it leaves the sphere. The outline of a lamp under a slab covers parts
+    /// whose rays pass between the two.
+    fn reach(&self, toward: DVec3, front: f64) -> f64 {
+        let Some((corners, rotation)) = self.boxed else { return front };
         let point = rotation.inverse() * (-self.distance * self.toward);
-        let [enters, leaves] = silhouette::through_box(corners, point, rotation.inverse() * toward)?;
-        (enters < leaves).then_some(enters)
+        let [enters, leaves] = silhouette::slabs(corners, point, rotation.inverse() * toward);
+        let back = self.distance * (1.0 + self.sine);
+        if enters < leaves { enters.max(front) } else { (0.5 * (enters + leaves)).clamp(front, back) }
     }
 
     /// The face of a panel with that bounding sphere, turned by `rotation`.
@@ -294,7 +297,7 @@ impl SeenLight {
         let front = self.distance * (tilt - self.sine * (1.0 - place.length_squared()).sqrt());
         LightPart {
             toward,
-            distance: self.enters_box(toward).map_or(front, |enters| enters.max(front)),
+            distance: self.reach(toward, front),
             sine: self.sine * block.area.sqrt(),
             weight: PI * self.sine * self.sine * block.area * block.weight / tilt,
         }

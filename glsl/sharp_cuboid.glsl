@@ -44,10 +44,7 @@ vec4 past_cuboid(Entity occluder, Surface surface, SeenLight light, Block block)
         }
         vec3 turned = mix(side * cosines * inverse, vec3(0.0), parallel);
         vec3 two = mix(share * share.yzx, min(share, share.yzx), max(-turned * turned.yzx, 0.0));
-        vec3 step = mix(cosines, vec3(LEAST_STEP), lessThan(abs(cosines), vec3(LEAST_STEP)));
-        vec3 one = (places - squares) / step, other = (places + squares) / step;
-        vec3 first = min(one, other), last = max(one, other);
-        vec2 in_box = vec2(max(max(first.x, first.y), first.z), min(min(last.x, last.y), last.z));
+        vec2 in_box = slabs(places - squares, places + squares, cosines);
         in_box = in_box.x > in_box.y ? vec2(-NO_BOX, NO_BOX) : in_box;
         near = mix(near, vec3(EVERYTHING), parallel);
         bool second = near.y < near.x;

@@ -134,6 +134,17 @@ void find_rim(float ramp, Entity shining, float step) {
     finest = max(finest, near ? min(2.0 * change, MOST_STEPS) : 0.0);
 }
 
+// Notes an occluder that leaves so much of a block's parts and has its nearest edge at `finest`: whether it covers the
+// block with none, and the nearest edge of all.
+void note_occluder(uint packed, vec4 free, inout bool covered, inout float nearest) {
+#if FINDS_STATES
+    bool matters = finest > 0.0 || free != vec4(1.0);
+    near_occluders |= matters ? occluder_bit(packed & SKY_CHAIN) : 0;
+#endif
+    covered = covered || (finest == 0.0 && free == vec4(0.0));
+    nearest = max(nearest, finest);
+}
+
 void add_open(float irradiance, float cone, Entity shining) {
     float white = dot(shining.emission, vec3(1.0)), light = irradiance * white;
     open_light += light * cone;
@@ -448,12 +459,7 @@ vec3 chain_sum(Surface surface, Entity shining, bool open, uint first, uint coun
                     vec4 free = let_through(ENTITY(packed & SKY_CHAIN), surface, light, block, true);
                     share *= free;
 #if EDGES
-#if FINDS_STATES
-                    bool matters = finest > 0.0 || free != vec4(1.0);
-                    near_occluders |= matters ? occluder_bit(packed & SKY_CHAIN) : 0;
-#endif
-                    covered = covered || (finest == 0.0 && free == vec4(0.0));
-                    nearest = max(nearest, finest);
+                    note_occluder(packed, free, covered, nearest);
 #endif
                     j = next_entry(surface, first, count, j + 1, true);
                     packed = entry_at(first + j);
@@ -489,12 +495,7 @@ vec3 chain_sum(Surface surface, Entity shining, bool open, uint first, uint coun
                     vec4 free = past_cuboid(ENTITY(packed & SKY_CHAIN), surface, light, block);
                     share *= free;
 #if EDGES
-#if FINDS_STATES
-                    bool matters = finest > 0.0 || free != vec4(1.0);
-                    near_occluders |= matters ? occluder_bit(packed & SKY_CHAIN) : 0;
-#endif
-                    covered = covered || (finest == 0.0 && free == vec4(0.0));
-                    nearest = max(nearest, finest);
+                    note_occluder(packed, free, covered, nearest);
 #endif
                     j = next_entry(surface, first, count, j + 1, true);
                     packed = entry_at(first + j);

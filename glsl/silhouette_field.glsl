@@ -12,6 +12,7 @@ READ_UVEC2(NODE_BINDING + 1, Cells, cells, cell_at)
 #include "cube.glsl"
 #include "blocked_share.glsl"
 #include "bytes.glsl"
+#include "slabs.glsl"
 
 const uint BOX_QUADS = 2;
 const uint WHOLE = 0, FAR = 1, NEAR = 2; // sides of an object: all of it, what lies beyond its centre along a direction, and before it
@@ -159,10 +160,7 @@ float share_blocked(float distance, float away, float tangent) {
 // and the outline alone decides.
 vec2 through_box(uint field, vec3 point, vec3 direction) {
 #if BOXES
-    vec3 per_step = 1.0 / mix(direction, vec3(LEAST_STEP), lessThan(abs(direction), vec3(LEAST_STEP)));
-    vec3 one = (node_quad(field).xyz - point) * per_step, other = (node_quad(field + 1).xyz - point) * per_step;
-    vec3 first = min(one, other), last = max(one, other);
-    vec2 ends = vec2(max(max(first.x, first.y), first.z), min(min(last.x, last.y), last.z));
+    vec2 ends = slabs(node_quad(field).xyz - point, node_quad(field + 1).xyz - point, direction);
     return ends.x > ends.y ? vec2(-NO_BOX, NO_BOX) : ends;
 #else
     return vec2(-NO_BOX, NO_BOX);

@@ -1,4 +1,5 @@
 // A ball, a panel or a tube of light and its parts, four to a block. The twin is src/field/sub_light.rs.
+#include "slabs.glsl"
 
 struct SeenLight {
     vec3 toward;    // unit, to its centre
@@ -152,15 +153,12 @@ float reach_of(SeenLight light, vec2 place, vec3 along) {
 #if OUTLINES && BOXES
     // A flat body lies behind most of its bounding sphere.
     vec3 direction = light.to_box * along;
-    vec3 per_step = 1.0 / mix(direction, vec3(LEAST_STEP), lessThan(abs(direction), vec3(LEAST_STEP)));
     vec3 point = -light.distance * light.to_box[0];
-    vec3 one = (light.box[0] - point) * per_step, other = (light.box[1] - point) * per_step;
-    vec3 first = min(one, other), last = max(one, other);
-    float enters = max(max(first.x, first.y), first.z), leaves = min(min(last.x, last.y), last.z);
+    vec2 ends = slabs(light.box[0] - point, light.box[1] - point, direction);
     // One that misses the body passes it there, at the latest where it leaves the sphere.
-    float passes = clamp(0.5 * (enters + leaves), reach, light.distance * (1.0 + light.sine));
+    float passes = clamp(0.5 * (ends.x + ends.y), reach, light.distance * (1.0 + light.sine));
     bool tells = light.box[0].x < light.box[1].x;
-    reach = tells ? max(reach, enters < leaves ? enters : passes) : reach;
+    reach = tells ? max(reach, ends.x < ends.y ? ends.x : passes) : reach;
 #endif
     return reach;
 }

@@ -85,6 +85,7 @@ embedded!(
     "silhouette.frag",
     "silhouette.vert",
     "silhouette_field.glsl",
+    "slabs.glsl",
     "smooth.frag",
     "smooth.vert",
     "srgb.glsl",

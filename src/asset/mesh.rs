@@ -345,9 +345,8 @@ impl Mesh {
 
     /// Whether a point is within the mesh, which is closed.
     pub(crate) fn holds(&self, point: DVec3) -> bool {
-        let [low, high] = self.extent().map(|corner| corner.as_dvec3());
-        let in_box = point.cmpge(low).all() && point.cmple(high).all();
-        in_box && topology::winding(&self.positions, &self.triangles, point).abs() > 0.5
+        let is_near = point.distance(self.centre.as_dvec3()) < f64::from(self.radius_m);
+        is_near && topology::winding(&self.positions, &self.triangles, point).abs() > 0.5
     }
 
     /// Signed volume in cubic metres, positive for a closed mesh wound outwards; of no meaning for an open one.

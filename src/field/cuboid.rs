@@ -6,7 +6,7 @@
 //! bounding radii of the box, as those of silhouette fields ([`super::silhouette`]) are, and so is the rule of what lies
 //! between a point and a light.
 
-use super::silhouette::{LEAST_PENUMBRA, LEAST_STEP, NEAREST, NO_BOX, blocked_share, counts_between};
+use super::silhouette::{LEAST_PENUMBRA, NEAREST, NO_BOX, blocked_share, counts_between, through_box};
 use glam::DVec3;
 
 /// Square of the sine of the angle between a ray and edges within which the ray counts as parallel to them: what the
@@ -47,18 +47,18 @@ impl Cuboid {
         let faces = [0, 1, 2].map(|i| edges[(i + 1) % 3].cross(edges[(i + 2) % 3]).dot(along));
         let squares = edges.map(|edge| edge.length_squared());
         let places = edges.map(|edge| edge.dot(to));
+        let lengths = squares.map(f64::sqrt);
+        let corner = DVec3::from_array(lengths);
+        let local = |v: DVec3| DVec3::from_array(std::array::from_fn(|i| edges[i].dot(v) / lengths[i]));
         let mut out = CuboidRay {
             distances: [[f64::INFINITY; 2]; 3],
             away: [[depth; 2]; 3],
             cosines: [0.0; 3],
-            in_box: [f64::NEG_INFINITY, f64::INFINITY],
+            in_box: through_box([-corner, corner], local(point), local(along)).unwrap_or([-NO_BOX, NO_BOX]),
         };
         let mut normals = [DVec3::ZERO; 3];
         for i in 0..3 {
             let [j, k] = [(i + 1) % 3, (i + 2) % 3];
-            let step = if cosines[i].abs() < LEAST_STEP { LEAST_STEP } else { cosines[i] };
-            let ends = [places[i] - squares[i], places[i] + squares[i]].map(|end| end / step);
-            out.in_box = [out.in_box[0].max(ends[0].min(ends[1])), out.in_box[1].min(ends[0].max(ends[1]))];
             let square = squares[i] - cosines[i] * cosines[i];
             if square < PARALLEL * squares[i] {
                 continue;
@@ -77,9 +77,6 @@ impl Cuboid {
             normals[i] = side * normal;
         }
         out.cosines = [0, 1, 2].map(|i| normals[i].dot(normals[(i + 1) % 3]));
-        if out.in_box[0] > out.in_box[1] {
-            out.in_box = [-NO_BOX, NO_BOX];
-        }
         out
     }
 
@@ -118,7 +115,6 @@ impl CuboidRay {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::field::silhouette::through_box;
 
     fn cuboid(half: DVec3) -> Cuboid {
         Cuboid {
@@ -134,8 +130,8 @@ mod tests {
         let count = 4000;
         let meets = |i: &u32| {
             let radius = tangent * ((f64::from(*i) + 0.5) / f64::from(count)).sqrt();
-            let (sine, cosine) = (f64::from(*i) * 2.399963).sin_cos();
-            let direction = (along + radius * (cosine * across + sine * beside)).normalize();
+            let turn = f64::from(*i) * 2.399963;
+            let direction = (along + radius * (turn.cos() * across + turn.sin() * beside)).normalize();
             through_box([-half, half], point, direction).is_some()
         };
         (0..count).filter(meets).count() as f64 / f64::from(count)

@@ -141,6 +141,7 @@ impl Frame {
             LightMethod::Harmonics | LightMethod::Outline => [0.0; 2],
         };
         let shift = slot.map_or(Fit::ROUND.packed(), |slot| slot.header.lattice.packed());
+        let maps = device_mesh.silhouette.as_ref().map(|slot| slot.first_quad);
         layout::DeviceEntity {
             centre: centre.extend((1.0 / radius_m) as f32).to_array(),
             alpha_beta: [cos_a, sin_a, cos_b, sin_b],
@@ -154,10 +155,7 @@ impl Frame {
             area_x: area_x.extend(terms[0]).to_array(),
             area_y: area_y.extend(terms[1]).to_array(),
             area_terms: [terms[2], terms[3], terms[4], terms[5]],
-            silhouette: match (self.cuboid(index), &device_mesh.silhouette) {
-                (Some(slot), _) => slot.first_quad,
-                (None, slot) => slot.as_ref().map_or(0, |slot| slot.first_quad),
-            },
+            silhouette: self.cuboid(index).map(|slot| slot.first_quad).or(maps).unwrap_or(0),
             light_kind: method.kind() as u32,
             light_size: light_size as f32,
             light_ratio: light_ratio as f32,

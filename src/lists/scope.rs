@@ -339,10 +339,9 @@ impl<'m> Scope<'m> {
         self.is_enough(radiance * view.weight.min(light.weight))
     }
 
-    /// What becomes of an occluder whose cone meets that of a sharp light. All rays from
-    /// the cluster to the light stay within a cone around the ray between the two middles. Where the object's outline
-    /// is farther from that ray than the cone is wide beside the object, all of them miss the object, or all of them
-    /// meet it.
+    /// What becomes of an occluder whose cone meets that of a sharp light. All rays from the cluster to the light stay
+    /// within a cone around the ray between the two middles. Where the object's outline is farther from that ray than
+    /// the cone is wide beside the object, all of them miss the object, or all of them meet it.
     pub fn outline_result(&self, occluder: usize, light: u32) -> CullResult {
         let skip = self.scene.skip;
         let [x, y, z, light_radius] = self.scene.spheres[light as usize];

@@ -289,7 +289,7 @@ impl Scene {
 
     /// Whether an entity has no motion and belongs to the group of all that rest.
     pub(crate) fn is_at_rest(&self, entity: usize) -> bool {
-        self.data.entities.get(entity).is_some_and(|data| data.motion.is_empty()) && !self.loose.contains(&entity)
+        self.carriers(entity).is_some_and(<[Motion]>::is_empty)
     }
 
     /// The nodes that carry an entity, none where it rests: entities with the same ones never move against each other.

@@ -121,6 +121,8 @@ void outlines(Rays rays, NodeCell cell, vec4 weights[4], uint side, out vec4 dis
 // `penumbra`: half its width from a part; `parts`: how many times as wide the light is.
 void find_edge(float distance, float away, float limit, float penumbra, float parts, float step) {
     bool stands = away > -NEAREST - step && away < limit + NEAREST + step;
+    // From one vertex to the next the ray turns about the light: what is near that moves little.
+    step *= clamp(1.0 - away / max(limit, 1e-30), 0.0, 1.0);
     bool near = stands && abs(distance) < penumbra + EDGE_REACH * step;
     finest = max(finest, near ? min(step / (parts * penumbra), MOST_STEPS) : 0.0);
 }

@@ -7,6 +7,7 @@ layout(local_size_x = 64) in;
 #define ENTITY_BINDING 0
 #include "entities.glsl"
 #include "readable.glsl"
+#include "links.glsl"
 READ_UVEC2(1, Ranges, ranges, range_at) // first link; how many, and above them the entity
 READ_UINT(2, Links, links, link_at)
 READ_VEC4(3, RunLight, run_light, run_light_at)
@@ -37,9 +38,8 @@ void main() {
     vec3 sum = vec3(0.0);
     for (uint k = range.x; k < range.x + count; k++) {
         uint packed = link_at(k);
-        sum += float(packed >> RUN_BITS) * run_light_at(packed & ((1u << RUN_BITS) - 1)).rgb;
+        sum += link_share(packed) * run_light_at(link_number(packed)).rgb;
     }
-    sum /= WHOLE_SHARE;
 #if MOVERS
     if (push.meets != 0) {
         vec4 incoming = incoming_at(i);

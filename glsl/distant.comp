@@ -9,6 +9,7 @@ layout(local_size_x = WORKGROUP) in;
 #define ENTITY_BINDING 0
 #include "entities.glsl"
 #include "readable.glsl"
+#include "links.glsl"
 READ_UINT(1, Entries, entries, entry_at)
 #define CLUSTER_BINDING 2
 #include "clusters.glsl"
@@ -28,7 +29,7 @@ void main() {
     uvec2 pair = pair_at(i);
     Cluster cluster = cluster_at(pair.x);
     uint first = cluster.entry_first;
-    uint e = pair.y & ((1u << RUN_BITS) - 1);
+    uint e = link_number(pair.y);
     Entity mover = ENTITY(e);
     vec3 middle = uintBitsToFloat(uvec3(entry_at(first), entry_at(first + 1), entry_at(first + 2)));
     vec3 to = mover.centre.xyz - ENTITY(cluster.receiver).centre.xyz - middle;
@@ -41,7 +42,7 @@ void main() {
     float cosine = clamp(1.0 - b[0] / (2.0 * PI * Y00), 0.0, 1.0);
     float square = (1.0 - cosine * cosine) * dot(to, to);
     vec3 centre = middle - length(to) * to_world(mover, direction);
-    float weight = mover.opacity * float(pair.y >> RUN_BITS) / WHOLE_SHARE;
+    float weight = mover.opacity * link_share(pair.y);
     spheres[2 * i] = vec4(centre, square);
     spheres[2 * i + 1] = vec4(seen(e, direction), weight);
 }

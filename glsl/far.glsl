@@ -2,6 +2,7 @@
 #define ENTITY_BINDING 0
 #include "entities.glsl"
 #include "readable.glsl"
+#include "links.glsl"
 READ_UINT(1, Entries, entries, entry_at)
 READ_VEC4(2, Far, far, far_at) // two a run, world: its middle; its mean normal, and the area that faces that way
 READ_VEC4(3, RunLight, run_light, run_light_at)
@@ -15,7 +16,7 @@ READ_VEC4(3, RunLight, run_light, run_light_at)
 vec4 near_light(vec3 place, vec3 normal, uint first, uint count) {
     vec4 sum = vec4(0.0);
     for (uint i = first; i < first + count; i++) {
-        uint packed = entry_at(i), run = packed & ((1u << RUN_BITS) - 1);
+        uint packed = entry_at(i), run = link_number(packed);
         vec3 to = far_at(2 * run).xyz - place;
         vec4 across = far_at(2 * run + 1);
         float area = across.w;
@@ -28,7 +29,7 @@ vec4 near_light(vec3 place, vec3 normal, uint first, uint count) {
         cosine = 0.5 * (cosine + sqrt(cosine * cosine + smoothed * smoothed));
         float square = max(height * height + beyond, 1e-20);
         float share = cosine * height * area / (square * (PI * square + area));
-        share *= float(packed >> RUN_BITS) / WHOLE_SHARE;
+        share *= link_share(packed);
         sum += share * vec4(run_light_at(run).rgb, 1.0);
     }
     return sum;

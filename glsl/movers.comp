@@ -66,12 +66,12 @@ void sum_far(Entity receiver, vec3 middle, uint v, uint first, uint count) {
         sums[k] = vec4(0.0);
     }
     for (uint i = first + v; i < first + count; i += WORKGROUP) {
-        uint packed = entry_at(i), run = packed & ((1u << RUN_BITS) - 1);
+        uint packed = entry_at(i), run = link_number(packed);
         vec3 to = far_at(2 * run).xyz - middle;
         vec4 across = far_at(2 * run + 1);
         float square = max(dot(to, to), 1e-20), distance = sqrt(square);
         float share = max(-dot(to, across.xyz), 0.0) * across.w / (distance * (PI * square + across.w));
-        share *= float(packed >> RUN_BITS) / WHOLE_SHARE;
+        share *= link_share(packed);
         float y[COEFFICIENTS];
         sh_basis(to_object(receiver, to / distance), y);
         [[unroll]] for (uint k = 0; k < min(COEFFICIENTS, 9); k++) {
@@ -155,7 +155,7 @@ void main() {
         taken += share;
     }
     for (uint i = first + near_count + far_count; i < end; i++) {
-        uint packed = entry_at(i), e = packed & ((1u << RUN_BITS) - 1);
+        uint packed = entry_at(i), e = link_number(packed);
         Entity mover = ENTITY(e);
         mover.centre.xyz -= receiver.centre.xyz;
         Cone cone = cone_of(mover.centre, position);
@@ -169,7 +169,7 @@ void main() {
         [[unroll]] for (uint k = 0; k < COEFFICIENTS; k++) {
             share += b[k] * cosine[k];
         }
-        share *= above_horizon(cone, normal) * mover.opacity * float(packed >> RUN_BITS) / (WHOLE_SHARE * PI);
+        share *= above_horizon(cone, normal) * mover.opacity * link_share(packed) / PI;
         share *= own_visible(own, to_object(receiver, cone.toward), cone.sine, cone.distance * receiver.centre.w);
         share = max(share, 0.0);
         sum += share * seen(e, seen_from(from, b));

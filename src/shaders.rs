@@ -53,6 +53,7 @@ embedded!(
     "grid_push.glsl",
     "holes.glsl",
     "leaving.glsl",
+    "links.glsl",
     "lists.glsl",
     "marks.glsl",
     "merge.comp",

@@ -8,6 +8,7 @@
 //! Aupperle, *A Rapid Hierarchical Radiosity Algorithm*, 1991). The sum of a vertex's links is the share of the
 //! hemisphere that shows fronts of the group.
 
+use crate::shaders::ShaderPermutation;
 use std::ops::Range;
 
 /// Vertices of a run, in the order of clusters: the smallest runs, clusters, and groups of those.
@@ -18,8 +19,26 @@ const LEAST_SHARE: f32 = 1.0 / 64.0;
 const MOST_LINKS: usize = 128;
 /// Bits of the number of a run, below those of its share.
 pub const RUN_BITS: u32 = 20;
-/// The share that all bits above those stand for.
-pub const WHOLE_SHARE: u32 = (1 << (32 - RUN_BITS)) - 1;
+/// The upper half of the smallest share that is kept, 2^-31, as f32.
+const LEAST_SHARE_BITS: u32 = (127 - 31) << 7;
+
+/// The number of a run below its share, of at most 1: the upper half of an f32, less that of the smallest. `None` where the
+/// share is smaller. Shares err by 0.4 %, small ones too: those of what is bright count.
+pub fn pack(share: f32, number: u32) -> Option<u32> {
+    let rounded = share.to_bits().saturating_add(1 << 15) >> 16;
+    rounded.checked_sub(LEAST_SHARE_BITS).map(|bits| bits << RUN_BITS | number)
+}
+
+/// The number of a run, and its share.
+pub fn unpack(packed: u32) -> (usize, f32) {
+    let share = f32::from_bits(((packed >> RUN_BITS) + LEAST_SHARE_BITS) << 16);
+    ((packed & ((1 << RUN_BITS) - 1)) as usize, share)
+}
+
+/// The macros of shaders that read links.
+pub fn macros(row: ShaderPermutation) -> ShaderPermutation {
+    row.define("RUN_BITS", RUN_BITS).define("LEAST_SHARE_BITS", LEAST_SHARE_BITS)
+}
 
 /// Numbers of the runs of a group's members.
 #[derive(Clone, Debug)]
@@ -91,25 +110,41 @@ pub struct Met {
     pub place: u32,
     /// Share of the cosine-weighted hemisphere.
     pub share: f32,
+    /// Whether its light counts however small its share is.
+    pub bright: bool,
 }
 
 /// The links of one vertex, of which the rays met that. Each has the number of a run and its share.
 pub fn links(mut met: Vec<Met>, runs: &Runs) -> Vec<u32> {
-    met.sort_unstable_by_key(|met| (met.member, met.place));
-    let mut links: Vec<(u32, f32)> = Vec::new();
-    const LARGEST: usize = RUNS.len() - 1;
-    for of_largest in met.chunk_by(|a, b| is_one(LARGEST, a, b)) {
-        let rest = join(LARGEST, of_largest, runs, &mut links);
-        links.extend(rest.filter(|rest| *rest > 0.0).map(|rest| (runs.of(LARGEST, of_largest), rest)));
-    }
+    met.sort_unstable_by_key(|met| (!met.bright, met.member, met.place));
+    let (bright, others) = met.split_at(met.partition_point(|met| met.bright));
+    let mut links = Vec::new();
+    // Light varies so much there that no run stands for others.
+    link(0, bright, runs, &mut links);
+    let first = links.len();
+    link(RUNS.len() - 1, others, runs, &mut links);
     if links.len() > MOST_LINKS {
-        let all: f32 = links.iter().map(|(_, share)| share).sum();
-        links.select_nth_unstable_by(MOST_LINKS, |a, b| b.1.total_cmp(&a.1));
-        links.truncate(MOST_LINKS);
-        let kept: f32 = links.iter().map(|(_, share)| share).sum();
-        links.iter_mut().for_each(|(_, share)| *share *= all / kept);
+        keep_largest(&mut links, if first < MOST_LINKS { first } else { 0 });
     }
-    packed(&links)
+    links.into_iter().filter_map(|(number, share)| pack(share, number)).collect()
+}
+
+/// Links runs of at most this size.
+fn link(largest: usize, met: &[Met], runs: &Runs, links: &mut Vec<(u32, f32)>) {
+    for of_largest in met.chunk_by(|a, b| is_one(largest, a, b)) {
+        let rest = join(largest, of_largest, runs, links);
+        links.extend(rest.filter(|rest| *rest > 0.0).map(|rest| (runs.of(largest, of_largest), rest)));
+    }
+}
+
+/// Leaves [`MOST_LINKS`]; the largest of those from `first` on take over the shares of the others.
+fn keep_largest(links: &mut Vec<(u32, f32)>, first: usize) {
+    let share = |links: &[(u32, f32)]| links.iter().map(|(_, share)| share).sum::<f32>();
+    let all = share(&links[first..]);
+    links[first..].select_nth_unstable_by(MOST_LINKS - first, |a, b| b.1.total_cmp(&a.1));
+    links.truncate(MOST_LINKS);
+    let kept = share(&links[first..]);
+    links[first..].iter_mut().for_each(|(_, share)| *share *= all / kept);
 }
 
 fn is_one(size: usize, a: &Met, b: &Met) -> bool {
@@ -142,19 +177,6 @@ fn join(size: usize, met: &[Met], runs: &Runs, links: &mut Vec<(u32, f32)>) -> O
     None
 }
 
-/// Shares in whole steps, so that their sum stays.
-fn packed(links: &[(u32, f32)]) -> Vec<u32> {
-    // What rounding took from the shares so far.
-    let mut lost = 0.0;
-    let pack = |(run, share): &(u32, f32)| {
-        let wanted = share * WHOLE_SHARE as f32 + lost;
-        let whole = wanted.round().clamp(0.0, WHOLE_SHARE as f32);
-        lost = wanted - whole;
-        (whole > 0.0).then_some((whole as u32) << RUN_BITS | run)
-    };
-    links.iter().filter_map(pack).collect()
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -185,14 +207,14 @@ mod tests {
                     3..13 => (0, 128 + rng.u32(0..64)),
                     _ => (0, 256 + rng.u32(0..744)),
                 };
-                Met { member, place, share: 1.0 / 700.0 }
+                Met { member, place, share: 1.0 / 700.0, bright: false }
             })
             .collect();
         let links = links(met, &runs);
-        let share = |link: &u32| f64::from(link >> RUN_BITS) / f64::from(WHOLE_SHARE);
-        let run = |link: &u32| link & ((1 << RUN_BITS) - 1);
+        let share = |link: &u32| f64::from(unpack(*link).1);
+        let run = |link: &u32| unpack(*link).0;
         assert!((links.iter().map(share).sum::<f64>() - 600.0 / 700.0).abs() < 1e-3);
-        let of = |wanted: u32| links.iter().filter(|link| run(link) == wanted).map(share).sum::<f64>();
+        let of = |wanted: usize| links.iter().filter(|link| run(link) == wanted).map(share).sum::<f64>();
         assert!((of(143 + 1) - 60.0 / 700.0).abs() < 1e-3, "the smallest run");
         let cluster = 125 + 2;
         let within: f64 = (16..24).map(of).sum();
@@ -200,13 +222,38 @@ mod tests {
         assert!(links.len() < 40, "{}", links.len());
     }
 
+    #[test]
+    fn small_shares_keep_their_size() {
+        for share in [1.0, 0.3, 1.0 / 64.0, 2e-5, 3e-8] {
+            let (number, found) = unpack(pack(share, 1_000_003).unwrap());
+            assert!(number == 1_000_003 && (found / share - 1.0).abs() < 0.004, "{share}: {found}");
+        }
+        assert_eq!([0.0, 1e-10].map(|share| pack(share, 7)), [None; 2]);
+    }
+
+    /// Where there are too many links, those of what is bright stay as they are.
+    #[test]
+    fn bright_fronts_are_linked_however_small_they_are() {
+        let runs = Runs::new([16_000, 80]);
+        let dim = (0..250).map(|i| Met { member: 0, place: 64 * i, share: 1e-3, bright: false });
+        let bright = (0..10).map(|i| Met { member: 1, place: 8 * i, share: 1e-6, bright: true });
+        let links = links(dim.chain(bright).collect(), &runs);
+        let first_bright = runs.of_size(0).find(|(_, (member, ..))| *member == 1).unwrap().0 as usize;
+        let shares =
+            |wanted: bool| links.iter().map(|link| unpack(*link)).filter(move |l| (l.0 >= first_bright) == wanted);
+        assert_eq!((links.len(), shares(true).count()), (MOST_LINKS, 10));
+        let [dim, bright] = [false, true].map(|wanted| shares(wanted).map(|(_, share)| share).sum::<f32>());
+        assert!((dim - 0.25).abs() < 1e-3 && (bright - 1e-5).abs() < 1e-7, "{dim} {bright}");
+    }
+
     /// Rays that meet one side of a run, which has another side in the dark, lead to that side alone.
     #[test]
     fn a_run_of_which_less_than_half_is_seen_stands_for_nothing() {
         let runs = Runs::new([512]);
-        let met =
-            |places: u32| links((0..places).map(|i| Met { member: 0, place: 8 * i, share: 1e-3 }).collect(), &runs);
-        let largest = |links: Vec<u32>| links.iter().map(|link| link & ((1 << RUN_BITS) - 1)).max();
+        let met = |places: u32| {
+            links((0..places).map(|i| Met { member: 0, place: 8 * i, share: 1e-3, bright: false }).collect(), &runs)
+        };
+        let largest = |links: Vec<u32>| links.iter().map(|link| unpack(*link).0).max();
         assert_eq!(largest(met(3)), Some(2));
         assert_eq!(met(3).len(), 3);
         // Four of eight clusters.

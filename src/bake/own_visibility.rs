@@ -37,6 +37,10 @@ const HORIZON_HEIGHT: f64 = 0.01;
 const EDGE_GAP: f32 = 0.01;
 /// Places that lie on one edge, one behind the other, are this close: 4 degrees.
 const CLOSE: f32 = 0.07;
+/// Rays that are aimed at a target, along an edge of the square that is mapped to the cone around it.
+const AIMED_SIDE: usize = 8;
+/// A target that is nearer than this, in its bounding radii, is met by enough rays of the pattern.
+const AIMED_FROM: f32 = 2.5;
 
 #[derive(Clone, Copy)]
 pub(super) struct PatternRay {
@@ -136,13 +140,18 @@ fn cells(side: usize) -> impl Iterator<Item = [usize; 2]> {
 /// The ray of a cell of a square of `side` by `side`. Rows of rays in the middle of their cells would all meet a straight
 /// edge at once. So each is moved within its cell, and along a row, or a column, the moves across it follow the golden
 /// ratio: whatever share of a row an edge cuts off, that share of its rays lies beyond.
-fn ray_of([x, y]: [usize; 2], side: usize) -> PatternRay {
+fn ray_of(cell: [usize; 2], side: usize) -> PatternRay {
+    let local = cap(moved(cell, side), 1.0);
+    PatternRay::new(local, local.z * TAU / (side * side) as f64)
+}
+
+/// The place in the unit square of the ray of a cell.
+fn moved([x, y]: [usize; 2], side: usize) -> [f64; 2] {
     let moved = |at: usize, across: usize| {
         let within = (0.5 + 0.618_033_988_749_894_9 * across as f64 + 0.754_877_666_246_692_7 * at as f64).fract();
         (at as f64 + within) / side as f64
     };
-    let local = hemisphere(moved(x, y), moved(y, x));
-    PatternRay::new(local, local.z * TAU / (side * side) as f64)
+    [moved(x, y), moved(y, x)]
 }
 
 fn rays(side: usize) -> Vec<PatternRay> {
@@ -179,10 +188,10 @@ pub(super) fn sphere() -> Vec<PatternRay> {
 
 static MANY_RAYS: LazyLock<Pattern> = LazyLock::new(Pattern::new);
 
-/// A direction of the hemisphere about +z for a point of the unit square; equal areas stay equal.
+/// A direction about +z, of which 1 - z is at most `height`, for a point of the unit square; equal areas stay equal.
 ///
-/// Shirley, Chiu, *A Low Distortion Map Between Disk and Square*, 1997, with the disc lifted to the hemisphere.
-fn hemisphere(u: f64, v: f64) -> DVec3 {
+/// Shirley, Chiu, *A Low Distortion Map Between Disk and Square*, 1997, with the disc lifted to the sphere.
+fn cap([u, v]: [f64; 2], height: f64) -> DVec3 {
     let a = 2.0 * u - 1.0;
     let b = 2.0 * v - 1.0;
     let (radius, angle) = if a.abs() > b.abs() {
@@ -192,8 +201,9 @@ fn hemisphere(u: f64, v: f64) -> DVec3 {
     } else {
         return DVec3::Z;
     };
-    let flat = radius * (2.0 - radius * radius).sqrt();
-    DVec3::new(flat * angle.cos(), flat * angle.sin(), 1.0 - radius * radius)
+    let below = radius * radius * height;
+    let flat = radius.signum() * (below * (2.0 - below)).sqrt();
+    DVec3::new(flat * angle.cos(), flat * angle.sin(), 1.0 - below)
 }
 
 /// A point of a surface from which rays leave.
@@ -235,6 +245,10 @@ pub struct Front {
     /// Triangle of the member's mesh, and the weights of its second and third corner there.
     pub triangle: u32,
     pub weights: [f32; 2],
+    /// In the blockers' frame.
+    pub place: Vec3A,
+    /// Whether it lies in a target.
+    pub bright: bool,
     /// Share of the cosine-weighted hemisphere.
     pub share: f32,
 }
@@ -258,6 +272,22 @@ pub struct Counts<'c> {
     pub blocks: &'c [bool],
     /// For each member whether the map has its shadows; `None` for no map.
     pub in_map: Option<&'c [bool]>,
+    pub targets: &'c [Target],
+}
+
+/// A sphere, in the blockers' frame, within which a lamp lights things from close by. They are so much brighter than all
+/// else that the few rays of the pattern which meet them show as blotches; rays that are aimed at the sphere take their
+/// place.
+#[derive(Clone, Copy)]
+pub struct Target {
+    pub centre: Vec3A,
+    pub radius: f32,
+}
+
+impl Target {
+    fn has(&self, place: Vec3A) -> bool {
+        place.distance_squared(self.centre) < self.radius * self.radius
+    }
 }
 
 /// Rays that leave one point, in the frame of its hemisphere.
@@ -275,9 +305,38 @@ impl Caster<'_> {
         hits
     }
 
-    fn front(&self, ray: &PatternRay, hit: &BlockerHit) -> Front {
-        let (triangle, weights) = self.blockers.place(self.origin, self.to_blockers * ray.local, hit);
-        Front { member: hit.member, triangle, weights, share: (ray.weight / PI) as f32 }
+    /// The front that a ray meets, if it meets one. `weight`: cosine to the normal times solid angle.
+    fn front(&self, local: Vec3A, weight: f64, hit: &Option<BlockerHit>) -> Option<Front> {
+        let hit = hit.as_ref().filter(|hit| !hit.from_behind && weight > 0.0)?;
+        let toward = self.to_blockers * local;
+        let (triangle, weights) = self.blockers.place(self.origin, toward, hit);
+        let place = self.origin + hit.distance * toward;
+        let bright = self.counts.targets.iter().any(|target| target.has(place));
+        Some(Front { member: hit.member, triangle, weights, place, bright, share: (weight / PI) as f32 })
+    }
+
+    /// Replaces the fronts within targets by those that rays meet which are aimed at them.
+    fn aim(&self, fronts: &mut Vec<Front>) {
+        for target in self.counts.targets {
+            let toward = target.centre - self.origin;
+            let away = toward.length();
+            if away < AIMED_FROM * target.radius {
+                continue;
+            }
+            fronts.retain(|front| !target.has(front.place));
+            let sine = f64::from(target.radius / away);
+            let height = 1.0 - (1.0 - sine * sine).sqrt();
+            let to_local = self.to_blockers.transpose() * Mat3A::from(frame((toward / away).as_dvec3()).as_mat3());
+            let ray = |cell| to_local * cap(moved(cell, AIMED_SIDE), height).as_vec3a();
+            let locals: Vec<Vec3A> = cells(AIMED_SIDE).map(ray).filter(|local| local.z > 0.0).collect();
+            let solid_angle = TAU * height / (AIMED_SIDE * AIMED_SIDE) as f64;
+            let hits = self.cast(&locals);
+            let met = locals
+                .iter()
+                .zip(&hits)
+                .filter_map(|(local, hit)| self.front(*local, solid_angle * f64::from(local.z), hit));
+            fronts.extend(met.filter(|front| target.has(front.place)));
+        }
     }
 
     /// How far each ray comes past all that the map counts; infinity where it is free.
@@ -327,9 +386,9 @@ pub fn see(blockers: &Blockers, standing: &Standing, eye: &Eye, bands: usize, ra
             let mut fronts = Vec::with_capacity(PATTERN);
             found.each(|ray, hit| {
                 add(ray, hit);
-                let front = hit.filter(|hit| !hit.from_behind && ray.weight > 0.0);
-                fronts.extend(front.map(|hit| caster.front(ray, &hit)));
+                fronts.extend(caster.front(ray.local, ray.weight, hit));
             });
+            caster.aim(&mut fronts);
             seen.fronts = fronts;
             if counts.in_map.is_some() {
                 seen.map = found.map(&caster, standing);
@@ -542,6 +601,7 @@ mod tests {
         let counts = Counts {
             blocks: &[true; 8],
             in_map: with_map.then_some(&[false, false, false, false, false, false, false, true]),
+            targets: &[],
         };
         let standing = Standing { rotation: DMat3::IDENTITY, radius: 1.0 };
         see(&Blockers::new(corners.map(triangle), Vec::new(), Vec::new()), &standing, &eye, 4, Rays::Many, counts)
@@ -607,7 +667,7 @@ mod tests {
             let wanted: f64 =
                 directions.iter().zip(&hits).filter(|(_, hit)| hit.is_some()).map(|(d, _)| f64::from(d.y)).sum();
             let wanted = wanted / directions.iter().map(|d| f64::from(d.y)).sum::<f64>();
-            let counts = Counts { blocks: &[true], in_map: None };
+            let counts = Counts { blocks: &[true], in_map: None, targets: &[] };
             let found = see(&blockers, &standing, &eye, 4, Rays::Many, counts).blocked;
             mean += (found / wanted - 1.0) / PLACES as f64;
             square += (found / wanted - 1.0).powi(2) / PLACES as f64;
@@ -648,7 +708,7 @@ mod tests {
         let eye = Eye { origin: Vec3::ZERO, normal: Vec3::Y };
         let standing = Standing { rotation: DMat3::IDENTITY, radius: 1.0 };
         let see_with = |in_map: &[bool], corners: &[(u32, [Vec3; 3])]| {
-            let counts = Counts { blocks: &[true; 2], in_map: Some(in_map) };
+            let counts = Counts { blocks: &[true; 2], in_map: Some(in_map), targets: &[] };
             see(
                 &Blockers::new(corners.iter().copied().map(triangle), Vec::new(), Vec::new()),
                 &standing,

@@ -3,7 +3,7 @@
 
 use super::cluster_order::cluster_order;
 use super::links::{Met, Runs, links};
-use super::own_visibility::{Counts, Eye, Front, PATTERN, Rays, Seen, Standing, see};
+use super::own_visibility::{Counts, Eye, Front, PATTERN, Rays, Seen, Standing, Target, see};
 use super::packet::{BlockerTriangle, Blockers, Mask};
 use super::refine::{Limits, Refined, refine};
 use super::triangles::{distinct, weights};
@@ -28,7 +28,7 @@ use std::sync::{Arc, OnceLock};
 use std::time::Instant;
 
 /// Counts in every name of the cache: another number where a bake of surfaces computes something else.
-const VERSION: u32 = 19;
+const VERSION: u32 = 28;
 /// How far towards the middle of its triangles a vertex is seen from, as a share of the way: the light of a crease is
 /// that just inside each face. Where meshes are left as they are, so are the places from which they are seen.
 const NUDGE: f32 = 0.02;
@@ -42,6 +42,11 @@ const FAR: f64 = 0.65;
 /// or long member reaches far beyond the box, and a floor on which it stands touches that: sun patches on the floor
 /// of a house with windows err 0.187 by maps and 0.025 by outlines, the shadow of a bowl on a table 0.062 and 0.024.
 const WITHIN: f64 = 0.02;
+/// A lamp lights a member from close by that is so near its middle, in the member's bounding radii, is no larger than so
+/// many of the lamp's, and than this share of the group's.
+const LIT_CLOSE: f64 = 1.5;
+const LIT_RADII: f64 = 8.0;
+const LIT_SHARE: f64 = 0.125;
 /// Share of the blocked cosine-weighted hemisphere that shows backs of triangles, from a place inside a solid or below a
 /// sheet.
 pub(super) const BURIED_BACKS: f64 = 0.5;
@@ -361,6 +366,8 @@ pub(super) struct Group<'p> {
     spheres: Vec<(DVec3, f64)>,
     /// Of each member in its own frame, metres.
     boxes: Vec<[DVec3; 2]>,
+    /// Where lamps light things from close by.
+    targets: Vec<Target>,
 }
 
 impl<'p> Group<'p> {
@@ -399,7 +406,8 @@ impl<'p> Group<'p> {
         let masks = plan.members.iter().map(mask).collect();
         let blockers = Blockers::new(triangles, masks, plan.members.iter().map(backs).collect());
         let boxes = plan.members.iter().map(|member| member.mesh.extent().map(|corner| corner.as_dvec3())).collect();
-        Group { plan, blockers, centre, radius_m, standings, spheres, boxes }
+        let targets = targets(&plan.members, &spheres);
+        Group { plan, blockers, centre, radius_m, standings, spheres, boxes, targets }
     }
 
     /// A place of the world in the group's frame.
@@ -413,6 +421,23 @@ impl<'p> Group<'p> {
         let others = (0..).zip(&blocks).map(|(i, blocks)| i != member && *blocks).collect();
         GroupSpace { group: self, member, blocks, others }
     }
+}
+
+/// Spheres around the members that a lamp of the group lights from close by, large ones first. `spheres` are those of all
+/// members.
+fn targets(members: &[Member], spheres: &[(DVec3, f64)]) -> Vec<Target> {
+    let lamps = || members.iter().zip(spheres).filter(|(member, _)| member.emits).map(|(_, sphere)| sphere);
+    let is_lit = |(centre, radius): &(DVec3, f64)| {
+        let lights =
+            |(lamp, size): &(DVec3, f64)| lamp.distance(*centre) < LIT_CLOSE * radius && *radius < LIT_RADII * size;
+        *radius < LIT_SHARE && lamps().any(lights)
+    };
+    let lit = members.iter().zip(spheres).filter(|(member, sphere)| member.receives && !member.emits && is_lit(sphere));
+    let target =
+        |(_, (centre, radius)): (_, &(DVec3, f64))| Target { centre: centre.as_vec3a(), radius: 1.01 * *radius as f32 };
+    let mut targets: Vec<Target> = lit.map(target).collect();
+    targets.sort_by(|a, b| b.radius.total_cmp(&a.radius));
+    targets
 }
 
 /// A member among its group: sees points of its own frame.
@@ -473,7 +498,7 @@ impl GroupSpace<'_> {
         let world = self.own().placement.point((position + nudge).as_dvec3());
         let eye = Eye { origin: group.place(world).into(), normal };
         let standing = &group.standings[self.member];
-        let counts = Counts { blocks: &self.blocks, in_map };
+        let counts = Counts { blocks: &self.blocks, in_map, targets: &group.targets };
         let mut seen = see(&group.blockers, standing, &eye, group.plan.bands, rays, counts);
         let is_covered = self.is_covered(position, normal, nudge);
         if is_covered {
@@ -585,10 +610,11 @@ impl GroupSpace<'_> {
                 let linked = |v: &u32| {
                     let mut seen = vertex(v);
                     let fronts = std::mem::take(&mut seen.fronts).into_iter();
-                    let met = fronts.map(|Front { member, triangle, weights, share }| Met {
+                    let met = fronts.map(|Front { member, triangle, weights, bright, share, .. }| Met {
                         member,
                         place: lit[member as usize].place(triangle, weights),
                         share,
+                        bright,
                     });
                     (seen, links(met.collect(), runs))
                 };

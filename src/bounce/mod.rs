@@ -14,11 +14,11 @@ mod relaxation;
 pub(crate) mod twin;
 
 use crate::asset::Mesh;
-use crate::bake::links::{RUN_BITS, RUNS, Runs, WHOLE_SHARE};
+use crate::bake::links::{self, RUN_BITS, RUNS, Runs};
 use crate::bake::surfaces::Links;
 use crate::error::Result;
 use crate::gpu::{Access, Bind, Buffer, BufferKind, Commands, ComputePipeline, Device, TexelView};
-use crate::layout::CLUSTER_VERTICES;
+use crate::layout::{CLUSTER_VERTICES, QUAD_FORMAT};
 use crate::lists::far::{FarRun, FarRuns};
 use crate::lists::incremental::ClusterLists;
 use crate::merge::MergeInputs;
@@ -127,6 +127,13 @@ impl Linked {
         // No buffer is empty.
         linked.links.extend(linked.links.is_empty().then_some(0));
         Some(linked)
+    }
+
+    /// Whether texel views of a device hold what is read of it.
+    pub fn fits_texels(&self, device: &Device) -> bool {
+        let quads = self.ranges.len().max(2 * self.run_count) as u64;
+        TexelView::fits(device, vk::Format::R32_UINT, 4 * self.links.len() as u64)
+            && TexelView::fits(device, QUAD_FORMAT, 16 * quads)
     }
 
     /// Whether light bounces between groups.
@@ -267,6 +274,8 @@ pub struct Bounce {
     ranges: Buffer,
     links: Buffer,
     run_light: Buffer,
+    /// Two quads a run: its middle, world, metres, and whether it rests; its mean normal, and the area that faces that way.
+    run_places: Buffer,
     run_count: u32,
     vertex_count: u32,
     movers: Option<Movers>,
@@ -307,11 +316,10 @@ impl Bounce {
         let run_count = linked.run_count as u32;
         let vertex_count = linked.ranges.len() as u32;
         let run_light = Buffer::new(device, "light of runs", BufferKind::Device, 16 * u64::from(run_count))?;
-        let fits = TexelView::fits(device, vk::Format::R32_UINT, 4 * linked.links.len() as u64)
-            && TexelView::fits(device, vk::Format::R32G32B32A32_SFLOAT, 16 * u64::from(vertex_count));
-        let texels = merge.reads_texels() && fits;
+        let texels = merge.reads_texels() && linked.fits_texels(device);
         let meets = linked.meets();
         let Linked { surfaces, far, ranges, .. } = linked;
+        let places: Vec<[f32; 4]> = far.runs.iter().flat_map(FarRun::quads).collect();
         let views_hold = TexelView::fits(device, vk::Format::R32_UINT, 4 * MOST_ENTRIES)
             && self_cells.is_none_or(|cells| TexelView::fits(device, vk::Format::R32G32_UINT, cells.size_bytes));
         let merge = MergePermutation { variant: merge.variant.restricted(views_hold, true), ..merge };
@@ -327,6 +335,7 @@ impl Bounce {
             ranges: Buffer::with_data(device, "ranges of links", &ranges)?,
             links: Buffer::with_data(device, "links", &linked.links)?,
             run_light,
+            run_places: Buffer::with_data(device, "places of runs", &places)?,
             steps: Steps::exactly(1, meets),
             run_count,
             vertex_count,
@@ -360,6 +369,12 @@ impl Bounce {
         self.movers.as_mut().map_or(Ok(()), |movers| movers.prepare(lists))
     }
 
+    /// What every vertex sees along its links, for reflections.
+    pub fn linked_light(&self) -> LinkedLight<'_> {
+        let Bounce { ranges, links, run_light, run_places, .. } = self;
+        LinkedLight { ranges, links, run_light, run_places }
+    }
+
     /// How what it reads of the merge is to be bound, if it reads any.
     pub fn reads(&self) -> Option<&MergePermutation> {
         self.movers.as_ref().map(Movers::permutation)
@@ -385,7 +400,8 @@ impl Bounce {
             commands.computed();
             let met = self.movers.as_ref().zip(work.met.as_ref());
             if let Some((movers, (inputs, self_cells))) = met.filter(|_| step == steps.alone) {
-                movers.record(commands, inputs, *self_cells, &self.run_light, count > 1)?;
+                let of_runs = [&self.run_places, &self.run_light];
+                movers.record(commands, inputs, *self_cells, of_runs, count > 1)?;
                 commands.computed();
             }
             let mut resources = vec![
@@ -419,6 +435,14 @@ impl Bounce {
     }
 }
 
+/// Links of all vertices, and the light and the places of the runs that they lead to.
+pub struct LinkedLight<'b> {
+    pub ranges: &'b Buffer,
+    pub links: &'b Buffer,
+    pub run_light: &'b Buffer,
+    pub run_places: &'b Buffer,
+}
+
 /// What the passes read and write in a frame.
 pub struct BounceWork<'w> {
     pub entities: &'w Buffer,
@@ -433,10 +457,8 @@ pub fn runs_row(texels: bool, soft: bool) -> ShaderPermutation {
 }
 
 pub fn bounce_row(texels: bool, soft: bool, movers: bool) -> ShaderPermutation {
-    ShaderPermutation::new("bounce.comp", 4)
+    links::macros(ShaderPermutation::new("bounce.comp", 4))
         .define("TEXEL", texels)
         .define("SOFT", soft)
         .define("MOVERS", movers)
-        .define("RUN_BITS", RUN_BITS)
-        .number("WHOLE_SHARE", f64::from(WHOLE_SHARE))
 }

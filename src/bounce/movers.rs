@@ -10,12 +10,12 @@
 //! What moves sees all that rests as flat discs with nothing between: a cut of a tree of runs ([`crate::lists::far`]).
 
 use super::LinkedEntity;
-use crate::bake::links::{RUN_BITS, RUNS, Runs, WHOLE_SHARE};
+use crate::bake::links::{self, RUNS, Runs};
 use crate::error::Result;
 use crate::field::self_visibility;
 use crate::gpu::{Bind, Buffer, Commands, ComputePipeline, Device, Upload};
 use crate::layout::CLUSTER_VERTICES;
-use crate::lists::far::{FarRun, FarRuns};
+use crate::lists::far::FarRuns;
 use crate::lists::incremental::{CUT_HEADER, ClusterLists, Reflectors};
 use crate::merge::MergeInputs;
 use crate::merge::variant::MergePermutation;
@@ -129,7 +129,6 @@ pub(super) struct Movers {
     permutation: MergePermutation,
     pub surfaces: Surfaces,
     pub far: FarRuns,
-    far_data: Buffer,
     movers_data: Upload,
     runs: Buffer,
     /// Of every entity, nine quads.
@@ -174,16 +173,10 @@ impl Movers {
             [] => Buffer::zeros(device, name, 16),
             quads => Buffer::with_data(device, name, quads),
         };
-        let quads = |run: &FarRun| {
-            let area = run.across.length();
-            [run.middle.extend(0.0).to_array(), (run.across / area.max(1e-20)).extend(area).to_array()]
-        };
-        let far_data: Vec<[f32; 4]> = far.runs.iter().flat_map(quads).collect();
         Ok(Movers {
             outgoing,
             distant,
             movers,
-            far_data: buffer("far runs", &far_data)?,
             movers_data: Upload::new(device, "movers", size_of_val(&surfaces.movers[..]).max(32) as u64)?,
             runs: buffer("runs of movers", bytemuck::cast_slice(&surfaces.runs))?,
             light: Buffer::zeros(device, "light of movers", (16 * OUTGOING * surfaces.rests.len()) as u64)?,
@@ -225,13 +218,13 @@ impl Movers {
     }
 
     /// Writes what every vertex receives from other groups, after the light of all runs was written. What moves reflects
-    /// light of what rests too where `bounced` says so.
+    /// light of what rests too where `bounced` says so. `places` and `run_light` are of every run.
     pub fn record<'r>(
         &'r self,
         commands: &mut Commands<'r>,
         inputs: &MergeInputs<'r>,
         self_cells: Option<&'r Buffer>,
-        run_light: &'r Buffer,
+        [places, run_light]: [&'r Buffer; 2],
         bounced: bool,
     ) -> Result<()> {
         let texels = self.permutation.reads_texels();
@@ -240,7 +233,7 @@ impl Movers {
             Ok([
                 inputs.entities.bind(),
                 Bind::read(texels, &self.entries, vk::Format::R32_UINT)?,
-                Bind::read(texels, &self.far_data, quads)?,
+                Bind::read(texels, places, quads)?,
                 Bind::read(texels, run_light, quads)?,
             ])
         };
@@ -294,10 +287,5 @@ pub fn movers_row(permutation: &MergePermutation, self_shadows: bool) -> ShaderP
 }
 
 fn far_row(permutation: &MergePermutation, file: &'static str) -> ShaderPermutation {
-    permutation
-        .row_of(file)
-        .define("RUN_BITS", RUN_BITS)
-        .number("WHOLE_SHARE", f64::from(WHOLE_SHARE))
-        .number("OVER", OVER)
-        .number("SMOOTH", SMOOTH)
+    links::macros(permutation.row_of(file)).number("OVER", OVER).number("SMOOTH", SMOOTH)
 }

@@ -3,7 +3,7 @@
 use super::movers::{Movers, OUTGOING, OVER, SMOOTH};
 use super::relaxation::MOST_STEPS;
 use super::{Bounce, RunBlock, Steps};
-use crate::bake::links::{RUN_BITS, RUNS, WHOLE_SHARE};
+use crate::bake::links::{RUNS, unpack};
 use crate::error::Result;
 use crate::field::self_visibility;
 use crate::layout::Cluster;
@@ -15,6 +15,7 @@ use crate::sh::lobe::clamped_cosine;
 use glam::{DVec3, Vec3, Vec4, Vec4Swizzles};
 use rayon::prelude::*;
 use std::f64::consts::PI;
+use std::ops::Range;
 
 /// What the passes read of the scene and of light.
 pub struct TwinInput<'t> {
@@ -67,6 +68,25 @@ impl Bounce {
         Ok(light)
     }
 
+    /// What the links of these vertices lead to, as the last frame has left it.
+    pub fn links_of(&self, vertices: Range<usize>) -> Result<Vec<Vec<SeenLink>>> {
+        let host = self.download()?;
+        let light: Vec<[f32; 4]> = self.run_light.download(self.run_count as usize)?;
+        let places: Vec<[[f32; 4]; 2]> = self.run_places.download(self.run_count as usize)?;
+        let seen = |link: &u32| {
+            let (run, share) = unpack(*link);
+            let [x, y, z, rests] = places[run][0].map(f64::from);
+            SeenLink {
+                share: f64::from(share) * rests,
+                middle: DVec3::new(x, y, z),
+                light: DVec3::from_slice(&light[run].map(f64::from)),
+            }
+        };
+        let of_vertex =
+            |(first, _, count): (usize, usize, usize)| host.links[first..][..count].iter().map(seen).collect();
+        Ok(host.vertices().skip(vertices.start).take(vertices.len()).map(of_vertex).collect())
+    }
+
     /// What the passes read of links, in host memory.
     pub(super) fn download(&self) -> Result<HostLinks> {
         let vertex_count = self.vertex_count as usize;
@@ -78,6 +98,16 @@ impl Bounce {
             links: self.links.download((self.links.size_bytes / 4) as usize)?,
         })
     }
+}
+
+/// The run that a link leads to.
+pub struct SeenLink {
+    /// Share of the cosine-weighted hemisphere; 0 where the run does not rest.
+    pub share: f64,
+    /// World, metres.
+    pub middle: DVec3,
+    /// Mean light that leaves it.
+    pub light: DVec3,
 }
 
 /// The links of all vertices, as [`super::Linked`] has them.
@@ -132,9 +162,8 @@ impl HostLinks {
 
     /// Light along links, as a share of the hemisphere times radiosity.
     pub fn along(&self, first: usize, count: usize, of_runs: &[DVec3]) -> DVec3 {
-        let run = |link: &u32| of_runs[(link & ((1 << RUN_BITS) - 1)) as usize];
-        let links = self.links[first..][..count].iter();
-        links.map(|link| run(link) * (f64::from(link >> RUN_BITS) / f64::from(WHOLE_SHARE))).sum()
+        let links = self.links[first..][..count].iter().map(|link| unpack(*link));
+        links.map(|(run, share)| of_runs[run] * f64::from(share)).sum()
     }
 }
 
@@ -177,9 +206,8 @@ impl Movers {
             let middle = receiver.centre + Vec3::from(std::array::from_fn(|i| f32::from_bits(header[i]))).as_dvec3();
             let far = self.far_light(far, of_runs, middle);
             let pairs = pairs[header[5] as usize..][..header[6] as usize].iter();
-            let spheres: Vec<Sphere> = pairs
-                .map(|[_, packed]| self.sphere(*packed, &input.objects[number_of(*packed)], &outgoing, middle))
-                .collect();
+            let spheres: Vec<Sphere> =
+                pairs.map(|[_, packed]| self.sphere(*packed, &input.objects, &outgoing, middle)).collect();
             let of_vertex = |v: usize| {
                 let vertex = (input.vertex)(cluster, v);
                 let normal = receiver.rotation * vertex.normal;
@@ -199,7 +227,7 @@ impl Movers {
                     taken += share;
                 }
                 for &packed in list {
-                    let entity = number_of(packed);
+                    let (entity, weight) = unpack(packed);
                     let object = &input.objects[entity];
                     let cone = Cone::new(object.centre, object.radius_m, vertex.position);
                     let to_object = object.rotation.inverse();
@@ -211,7 +239,7 @@ impl Movers {
                     let share: f64 = blocked.iter().zip(&cosine).map(|(b, c)| b * c).sum();
                     let own = own_visible(&vertex, receiver, &cone, object.radius_m);
                     let share = share * cone.above_horizon(normal, input.skip) * object.opacity / PI * own;
-                    let share = weight_of(packed) * share.max(0.0);
+                    let share = f64::from(weight) * share.max(0.0);
                     sum += share * seen(&outgoing[entity], seen_from(from, field.header.bands, &blocked));
                     taken += share;
                 }
@@ -231,10 +259,12 @@ impl Movers {
     fn sphere(
         &self,
         packed: u32,
-        object: &MergeObject<'_>,
+        objects: &[MergeObject<'_>],
         outgoing: &[[(DVec3, f64); OUTGOING]],
         middle: DVec3,
     ) -> Sphere {
+        let (entity, weight) = unpack(packed);
+        let object = &objects[entity];
         let to = object.centre - middle;
         let from = object.rotation.inverse() * -to / object.radius_m;
         let field = object.blocked.expect("what reflects has an occlusion field");
@@ -245,8 +275,8 @@ impl Movers {
         Sphere {
             centre: middle - to.length() * (object.rotation * direction),
             radius_m: (1.0 - cosine * cosine).sqrt() * to.length(),
-            light: seen(&outgoing[number_of(packed)], direction),
-            weight: object.opacity * weight_of(packed),
+            light: seen(&outgoing[entity], direction),
+            weight: object.opacity * f64::from(weight),
         }
     }
 
@@ -284,22 +314,13 @@ impl Movers {
     }
 
     fn seen_run(&self, entry: u32, place: DVec3) -> SeenRun {
-        let number = number_of(entry);
+        let (number, weight) = unpack(entry);
         let run = &self.far.runs[number];
         let to = run.middle.as_dvec3() - place;
         let area = f64::from(run.across.length());
         let axis = run.across.as_dvec3() / area.max(1e-20);
-        SeenRun { number, weight: weight_of(entry), to, axis, area, height: (-to.dot(axis)).max(0.0) }
+        SeenRun { number, weight: weight.into(), to, axis, area, height: (-to.dot(axis)).max(0.0) }
     }
-}
-
-/// Number of a run or an entity below a weight.
-fn number_of(packed: u32) -> usize {
-    (packed & ((1 << RUN_BITS) - 1)) as usize
-}
-
-fn weight_of(packed: u32) -> f64 {
-    f64::from(packed >> RUN_BITS) / f64::from(WHOLE_SHARE)
 }
 
 /// A mover far away.

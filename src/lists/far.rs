@@ -2,7 +2,7 @@
 //!
 //! A cluster of vertices sees near pieces vertex by vertex, and far ones from its middle, as SH for all its vertices.
 
-use crate::bake::links::{RUN_BITS, WHOLE_SHARE};
+use crate::bake::links;
 use glam::Vec3;
 use std::ops::Range;
 
@@ -21,6 +21,8 @@ const NEAR: [f32; 2] = [1.5, 2.0];
 /// radii, and its centre than so many of its own.
 const DISTANT_CLUSTERS: [f32; 2] = [1.0, 1.5];
 const DISTANT_RADII: [f32; 2] = [1.5, 2.0];
+/// A smaller weight is left out.
+const LEAST_WEIGHT: f32 = 1e-4;
 
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct FarRun {
@@ -34,6 +36,15 @@ pub struct FarRun {
     pub parts: Range<u32>,
 }
 
+impl FarRun {
+    /// As devices read it: middle, and whether it rests; mean normal, and the area that faces that way.
+    pub fn quads(&self) -> [[f32; 4]; 2] {
+        let area = self.across.length();
+        let rests = f32::from(u8::from(self.area_m2 > 0.0));
+        [self.middle.extend(rests).to_array(), (self.across / area.max(1e-20)).extend(area).to_array()]
+    }
+}
+
 /// All runs of a scene, by number; those that do not rest have no area.
 #[derive(Default)]
 pub struct FarRuns {
@@ -42,7 +53,7 @@ pub struct FarRuns {
     pub roots: Vec<u32>,
 }
 
-/// What a cluster sees of all that rests: runs below their weights, packed as links are ([`RUN_BITS`]).
+/// What a cluster sees of all that rests: runs below their weights, packed as links are.
 #[derive(Default)]
 pub struct Cut {
     /// For each of its vertices.
@@ -83,10 +94,9 @@ impl FarRuns {
     }
 }
 
-/// A number below a weight of 0 to 1, as links are packed; `None` where it has none.
+/// A number below a weight of 0 to 1; `None` where it is too small to matter.
 pub fn pack(weight: f32, number: u32) -> Option<u32> {
-    let packed = (weight * WHOLE_SHARE as f32).round() as u32;
-    (packed > 0).then_some(packed << RUN_BITS | number)
+    if weight < LEAST_WEIGHT { None } else { links::pack(weight, number) }
 }
 
 /// How much of a mover, whose centre is `distance_m` from the middle of a cluster, is seen from there, and not from each
@@ -123,13 +133,12 @@ mod tests {
             let Cut { near, far } = tree.cut(Vec3::new(x, 0.1, 0.0), radius);
             let mut covered = [0.0; 16];
             for entry in near.iter().chain(&far) {
-                let number = entry & ((1 << RUN_BITS) - 1);
-                let weight = f64::from(entry >> RUN_BITS) / f64::from(WHOLE_SHARE);
-                let under = tree.runs[number as usize].parts.clone();
-                let leaves = if under.is_empty() { number..number + 1 } else { under };
-                leaves.for_each(|leaf| covered[leaf as usize - 4] += weight);
+                let (number, weight) = links::unpack(*entry);
+                let under = tree.runs[number].parts.clone();
+                let leaves = if under.is_empty() { number as u32..number as u32 + 1 } else { under };
+                leaves.for_each(|leaf| covered[leaf as usize - 4] += f64::from(weight));
             }
-            assert!(covered.iter().all(|weight| (weight - 1.0).abs() < 1e-3), "{x}: {covered:?}");
+            assert!(covered.iter().all(|weight| (weight - 1.0).abs() < 4e-3), "{x}: {covered:?}");
             sizes.push([near.len(), far.len()]);
         }
         assert_eq!([sizes[3], sizes[5]], [[0, 4], [16, 0]], "all large from afar, all small from within");

@@ -245,6 +245,57 @@ fn light_bounces_through_a_door_and_not_through_walls() {
     assert_eq!(long, 0, "triangles reach from one room into the other");
 }
 
+/// A shade around a lamp is brighter by far than all else, and small: every vertex of the room finds it by rays that are
+/// aimed at it. Those that leave in one pattern meet it once or never, and light the walls in blotches.
+#[test]
+fn the_inside_of_a_shade_lights_walls_evenly() {
+    let Some(stage) = stage() else { return };
+    let upper = |mesh: Mesh| -> Mesh {
+        let is_upper = |triangle: &[u32; 3]| triangle.iter().all(|&v| mesh.positions[v as usize].y > -0.01);
+        let triangles = mesh.triangles.iter().copied().filter(is_upper).collect();
+        Mesh::new("upper", mesh.positions, mesh.normals, None, triangles).unwrap()
+    };
+    let [outer, inner] = [upper(generate::sphere(0.21, 3)), upper(inside(generate::sphere(0.2, 3)))];
+    let first = outer.positions.len() as u32;
+    let shell = Mesh::new(
+        "shade",
+        [outer.positions, inner.positions].concat(),
+        [outer.normals, inner.normals].concat(),
+        None,
+        outer.triangles.into_iter().chain(inner.triangles.iter().map(|t| t.map(|v| v + first))).collect(),
+    );
+    let shade = Vec3::new(0.0, 0.5, 0.0);
+    let of = |mesh: &str| EntityData { albedo: Vec3::splat(0.7).into(), ..EntityData::of_mesh(mesh) };
+    let scene = Scene::builder()
+        .mesh("room", inside(generate::cuboid(Vec3::new(4.0, 2.6, 4.0), 24)))
+        .mesh("shade", shell.unwrap())
+        .mesh("lamp", generate::sphere(0.05, 2))
+        .entity(of("room"))
+        .entity(EntityData { position: shade, ..of("shade") })
+        .entity(EntityData { position: shade, ..lamp() })
+        .build()
+        .unwrap();
+    let placements = scene.at(0.0);
+    let [direct, one] = [Bounces::None, Bounces::One].map(|bounces| {
+        let mut frame = stage.frame(&scene, usual(bounces));
+        stage.light(&mut frame, &placements)
+    });
+    // Places in corners see half of what those beside them do.
+    let is_wall = |v: &Vertex| {
+        let mesh = &scene.meshes[0];
+        let place = mesh.positions[v.index].abs();
+        v.entity == 0 && mesh.normals[v.index].y == 0.0 && place.y < 1.2 && place.x.min(place.z) < 1.9
+    };
+    let walls: Vec<Vertex> = receiver_vertices(&scene).into_iter().filter(is_wall).step_by(41).collect();
+    let world = World::of(&scene, &placements);
+    let rays = |bounces| RayCast { rays: 1 << 14, bounces, ..RayCast::default() }.run(&world, &walls);
+    let wanted = rays(1).into_iter().zip(rays(0)).map(|(one, direct)| one.radiosity[0] - direct.radiosity[0]);
+    let found = walls.iter().map(|v| f64::from(one[0][v.index][0] - direct[0][v.index][0]));
+    let error = relative_rms(found.zip(wanted));
+    println!("{error:.4}");
+    assert!(walls.len() > 40 && error < 0.07, "{} vertices: {error}", walls.len());
+}
+
 /// Nothing jumps where what a thing sees of the floor is cut otherwise: ten times smaller steps
 /// change light ten times less. (Steps of a millimetre: 0.012 of the brightest, under the ball.)
 #[test]

@@ -127,19 +127,32 @@ vec2 reflected_share(View view, float roughness) {
 }
 #endif
 
-#if HIGHLIGHTS
-// The reflection of a part of a light, of radiance 1: `along` unit, to its middle; `sine` of its angular radius, `omega`
-// its solid angle. The part counts as a point, and the slopes are as much wider as it is wide.
-vec2 reflect_part(View view, vec3 along, float sine, float omega) {
-    float cosine = part_cosine(dot(view.normal, along), sine);
-    vec3 half_way = normalize(along + view.toward);
-    float half_z = max(dot(view.normal, half_way), 0.0), view_half = max(dot(view.toward, half_way), 1e-4);
+#if HIGHLIGHTS || LINKS
+// Cosine between the view and the vector half way to a direction.
+float half_cosine(View view, vec3 along) {
+    return max(sqrt(max(0.5 + 0.5 * dot(along, view.toward), 0.0)), 1e-4);
+}
+
+// The lobe towards a part of the light, without Schlick's term. `along` is unit, to its middle, `lit` its cosine to the
+// normal and `omega` its solid angle. The part counts as a point, and the slopes are as much wider as it is wide.
+float lobe_of_part(View view, vec3 along, float lit, float omega) {
+    float view_half = half_cosine(view, along);
+    float half_z = max(dot(view.normal, along + view.toward) / (2.0 * view_half), 0.0);
     float slopes = min(omega / max(4.0 * view_half * half_z * half_z * half_z, 1e-30), MOST_SLOPES);
     float widened = view.alpha * view.alpha + WIDENED * slopes;
     float below = (widened - 1.0) * half_z * half_z + 1.0;
+    return widened / (PI * below * below) * masking(view, lit);
+}
+#endif
+
+#if HIGHLIGHTS
+// The reflection of a part of a light, of radiance 1: `along` unit, to its middle; `sine` of its angular radius, `omega`
+// its solid angle.
+vec2 reflect_part(View view, vec3 along, float sine, float omega) {
+    float cosine = part_cosine(dot(view.normal, along), sine);
     float lit = max(dot(view.normal, along), cosine);
-    float value = widened / (PI * below * below) * masking(view, lit) * cosine * omega;
-    float term = schlick(view_half);
+    float value = lobe_of_part(view, along, lit, omega) * cosine * omega;
+    float term = schlick(half_cosine(view, along));
     return cosine > 0.0 ? value * vec2(1.0 - term, term) : vec2(0.0);
 }
 

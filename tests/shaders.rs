@@ -41,7 +41,8 @@ fn bouncing() -> Vec<ShaderPermutation> {
             bounce_row(texels, false, true),
             bounce_row(texels, true, false),
             bounce_row(texels, true, true),
-            gloss_row(texels),
+            gloss_row(texels, true),
+            gloss_row(texels, false),
         ]
     };
     let usual = usual_permutation();

@@ -2,27 +2,31 @@
 
 use super::CheckRow;
 use super::merge::{MIXED, options, scene};
-use crate::bake::Baker;
 use crate::bake::cache::Cache;
+use crate::bake::{self, Baker};
+use crate::bounce::Bounces;
 use crate::error::Result;
-use crate::frame::Frame;
+use crate::frame::{self, Frame};
+use crate::lists::skip::Skip;
 use crate::scene::Gloss;
 
 /// Filters of textures have eight bits between two texels, and texels of eleven bits.
 const FILTERED: f64 = 0.01;
 
 /// Compares what every vertex of a scene reflects at three roughnesses: of a mirror, whose pixels look the sky up, and
-/// of two rougher ones.
+/// of two rougher ones; of the sky, and of what stands near.
 pub fn rows(baker: &Baker, add: &mut dyn FnMut(CheckRow)) -> Result<()> {
     let mut scene = scene(MIXED)?;
-    for roughness in [0.2, 0.5, 1.0] {
+    for (roughness, bounces) in [0.2, 0.5, 1.0].into_iter().flat_map(|r| [(r, Bounces::None), (r, Bounces::One)]) {
         for index in 0..scene.data.entities.len() {
             let gloss = Gloss { roughness, metallic: 0.5, f0: 0.04 };
             let data = crate::scene::EntityData { gloss: Some(gloss), ..scene.data.entities[index].clone() };
             scene.set_entity(index, data)?;
         }
         let placements = scene.at(0.0);
-        let mut frame = Frame::new(baker, &Cache::default(), &scene, options(), &|_, _, _| ())?;
+        let of_bounces = bake::Options { groups: bounces != Bounces::None, ..options().bake };
+        let options = frame::Options { bounces, bake: of_bounces, skip: Skip::without("hidden"), ..options() };
+        let mut frame = Frame::new(baker, &Cache::default(), &scene, options, &|_, _, _| ())?;
         frame.render(&placements, Some(1.0))?;
         let mut worst = 0.0_f64;
         let mut most = 0.0_f64;
@@ -34,7 +38,8 @@ pub fn rows(baker: &Baker, add: &mut dyn FnMut(CheckRow)) -> Result<()> {
             }
         }
         let worst = if most > 0.0 { worst / most } else { f64::INFINITY };
-        add(CheckRow::new("gloss", format!("roughness {roughness}"), "of the brightest", worst, FILTERED));
+        let what = format!("roughness {roughness}{}", if bounces == Bounces::None { "" } else { ", one bounce" });
+        add(CheckRow::new("gloss", what, "of the brightest", worst, FILTERED));
     }
     Ok(())
 }

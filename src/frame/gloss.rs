@@ -1,6 +1,8 @@
 //! Reflections of a frame: which entities have them, of which lights, and how the eye sees them now.
 
-use super::Frame;
+use super::{Frame, Viewport};
+use crate::bounce::Bounce;
+use crate::bounce::twin::SeenLink;
 use crate::draw::DrawnGloss;
 use crate::draw::camera::world_from_centred;
 use crate::draw::triangles::Detail;
@@ -10,7 +12,7 @@ use crate::gloss::sky_map::SkyMap;
 use crate::gloss::twin::{Twin, TwinVertex};
 use crate::gloss::{DrawnReflections, Glossy, PIXEL_ROUGHNESS, ReflectionInputs, Reflections};
 use crate::gpu::{Buffer, Device};
-use crate::layout::{GlossEntity, NONE, SHOWN_LIGHTS};
+use crate::layout::{Cluster, GlossEntity, NONE, SHOWN_LIGHTS};
 use crate::scene::{Entity, LightMethod, MapIndices, Placement, Scene};
 use crate::scene_buffers::SceneBuffers;
 use crate::shaders::Library;
@@ -27,6 +29,7 @@ pub(super) fn reflections(
     buffers: &SceneBuffers,
     light_bytes: u64,
     texels: bool,
+    links: bool,
 ) -> Result<Option<Reflections>> {
     let is_glossy = |index: &usize| scene.entities[*index].reflection().is_some();
     let lights = shown_lights(scene, methods);
@@ -47,7 +50,7 @@ pub(super) fn reflections(
     }
     let count = scene.entities.len();
     let sky = &scene.environment;
-    Reflections::new(device, library, sky, glossy, count, light_bytes, texels).map(Some)
+    Reflections::new(device, library, sky, glossy, count, light_bytes, texels, links).map(Some)
 }
 
 /// The sharp lights that are strongest at the centre of each entity, at the scene's first time.
@@ -85,9 +88,10 @@ pub(super) fn detail(entity: &Entity) -> Option<Detail> {
 }
 
 impl Frame {
-    /// The glossy entities as the scene's camera sees them.
-    pub(super) fn prepare_gloss(&mut self, placements: &[Placement]) -> Result<()> {
-        let Some(reflections) = &self.reflections else { return Ok(()) };
+    /// The glossy entities as the scene's camera sees them, and their clusters that viewports may show.
+    pub(super) fn prepare_gloss(&mut self, placements: &[Placement], viewports: &[Viewport]) -> Result<()> {
+        let sights = if self.options.skip.hidden { self.sights(placements, viewports) } else { None };
+        let Some(reflections) = &mut self.reflections else { return Ok(()) };
         let eye = self.scene.data.camera.eye;
         let mut entities = vec![GlossEntity::default(); placements.len()];
         for glossy in &reflections.glossy {
@@ -124,7 +128,11 @@ impl Frame {
                 ],
             };
         }
-        self.reflections.as_mut().map_or(Ok(()), |reflections| reflections.entities.write(&entities))
+        reflections.entities.write(&entities)?;
+        let is_glossy: Vec<bool> = entities.iter().map(|entity| entity.vertex_count > 0).collect();
+        let clusters = self.work.lists.clusters_of(&is_glossy, sights.as_deref());
+        let first = |cluster: &Cluster| cluster.radiosity_first - entities[cluster.receiver as usize].radiosity_first;
+        reflections.set_clusters(&clusters.map(|cluster| [cluster.receiver, first(cluster)]).collect::<Vec<_>>())
     }
 
     pub(super) fn drawn_gloss(&self, entity: &Entity) -> Option<DrawnGloss<'_>> {
@@ -139,11 +147,12 @@ impl Frame {
             vertices: &self.buffers.vertices,
             direct: self.radiosity.direct(),
             radiosity: &self.radiosity.merged,
+            linked: self.bounce.as_ref().map(Bounce::linked_light),
         };
         self.reflections.as_ref().map(|reflections| (reflections, inputs))
     }
 
-    /// What the vertices of an entity reflect in the last picture, as they are stored, and what the twin finds by the
+    /// What the vertices of an entity reflect in the last picture, as they are stored, where nothing is skipped, and what the twin finds by the
     /// same transfer.
     pub fn reflections_beside_twin(&self, entity: usize, placements: &[Placement]) -> Result<[Vec<[DVec3; 2]>; 2]> {
         let Some(reflections) = &self.reflections else { return Ok([Vec::new(), Vec::new()]) };
@@ -158,13 +167,33 @@ impl Frame {
         let found = reflections.read(first, vertex_count)?;
         let found = found.iter().map(|pair| pair.map(|[r, g, b, _]| DVec3::new(r.into(), g.into(), b.into())));
         let through = reflections.read_through(first, vertex_count)?;
-        let wanted = surface.order.iter().zip(through).map(|(&v, through)| {
+        let bounced = self.bounced_beside_links(first, entity, vertex_count)?;
+        let wanted = surface.order.iter().zip(through).zip(bounced).map(|((&v, through), bounced)| {
             let place = placement.point(mesh.positions[v as usize].as_dvec3());
             let normal = (placement.turn() * mesh.normals[v as usize].as_dvec3()).normalize();
-            let vertex = TwinVertex { normal, toward: (eye - place).normalize(), through, bounced: DVec3::ZERO };
+            let vertex = TwinVertex { normal, toward: (eye - place).normalize(), through, place, bounced };
             twin.vertex(&vertex, roughness)
         });
         Ok([found.collect(), wanted.collect()])
+    }
+
+    /// Of each vertex of an entity, the irradiance over pi of light that has bounced, and what its links lead to.
+    fn bounced_beside_links(
+        &self,
+        first: usize,
+        entity: usize,
+        vertex_count: usize,
+    ) -> Result<Vec<Option<(DVec3, Vec<SeenLink>)>>> {
+        let Some(bounce) = &self.bounce else { return Ok((0..vertex_count).map(|_| None).collect()) };
+        let bytes = 16 * first as u64..16 * (first + vertex_count) as u64;
+        let [before, after] = [self.radiosity.direct(), &self.radiosity.merged];
+        let light = |buffer: &Buffer| buffer.download_range::<[f32; 4]>(bytes.clone());
+        let albedo = self.scene.entities[entity].albedo.as_dvec3().max(DVec3::splat(1e-4));
+        let bounced = light(before)?.into_iter().zip(light(after)?).map(|(before, after)| {
+            let [before, after] = [before, after].map(|light| DVec3::from_slice(&light.map(f64::from)));
+            (after - before).max(DVec3::ZERO) / albedo
+        });
+        Ok(bounced.zip(bounce.links_of(first..first + vertex_count)?).map(Some).collect())
     }
 
     pub(super) fn drawn_reflections(&self) -> Option<DrawnReflections<'_>> {

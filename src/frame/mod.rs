@@ -126,6 +126,23 @@ impl Frame {
         let mut radiosity = RadiosityBuffers::new(device, &scene, &buffers)?;
         let wanted = permutation(&options, wanted, &scene, &methods, uniform_entities(device));
         let wanted = MergePermutation { volume: buffers.volume.is_some(), ..wanted };
+        let placements = scene.at(0.0);
+        let linked = |(entity, links)| LinkedEntity {
+            mesh: scene.surface(entity),
+            order: &buffers.surface(entity).order,
+            first: radiosity.offsets[entity] as usize / 16,
+            centre_m: buffers.meshes[scene.entities[entity].mesh].centre_m,
+            radius_m: buffers.meshes[scene.entities[entity].mesh].radius_m,
+            reflects: scene.entities[entity].occludes && buffers.shadows(&scene, entity),
+            rests: scene.is_at_rest(entity),
+            placement: placements[entity],
+            receives: scene.entities[entity].receives,
+            links,
+        };
+        let bounces = options.bounces != Bounces::None;
+        let linked = bounces
+            .then(|| links.into_iter().enumerate().map(linked).collect::<Vec<_>>())
+            .and_then(|entities| Linked::new(&entities, &rigid));
         let reflections = gloss::reflections(
             device,
             library,
@@ -133,7 +150,8 @@ impl Frame {
             &methods,
             &buffers,
             radiosity.merged.size_bytes,
-            wanted.variant.reads == Reads::Texels,
+            wanted.variant.reads == Reads::Texels && linked.as_ref().is_none_or(|linked| linked.fits_texels(device)),
+            linked.is_some(),
         )?;
         let wanted = MergePermutation { gloss: reflections.is_some(), ..wanted };
         let permutation = usable(device, &buffers, entity_count, wanted);
@@ -157,23 +175,6 @@ impl Frame {
                 "no pixel evaluates lights: the device's texel buffers cannot hold the silhouette fields or the light of all vertices"
             );
         }
-        let placements = scene.at(0.0);
-        let linked = |(entity, links)| LinkedEntity {
-            mesh: scene.surface(entity),
-            order: &buffers.surface(entity).order,
-            first: radiosity.offsets[entity] as usize / 16,
-            centre_m: buffers.meshes[scene.entities[entity].mesh].centre_m,
-            radius_m: buffers.meshes[scene.entities[entity].mesh].radius_m,
-            reflects: scene.entities[entity].occludes && buffers.shadows(&scene, entity),
-            rests: scene.is_at_rest(entity),
-            placement: placements[entity],
-            receives: scene.entities[entity].receives,
-            links,
-        };
-        let bounces = options.bounces != Bounces::None;
-        let linked = bounces
-            .then(|| links.into_iter().enumerate().map(linked).collect::<Vec<_>>())
-            .and_then(|entities| Linked::new(&entities, &rigid));
         let self_cells = buffers.has_self_shadows().then_some(&buffers.self_cells);
         let soft = sharp.is_some();
         let sharp =

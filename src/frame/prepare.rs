@@ -88,7 +88,7 @@ impl Frame {
         }
         if !viewports.is_empty() {
             self.prepare_chains()?;
-            self.prepare_gloss(placements)?;
+            self.prepare_gloss(placements, viewports)?;
             self.prepare_lines(placements, viewports)?;
         }
         Ok(())

@@ -14,6 +14,8 @@ pub mod sky_map;
 pub mod twin;
 
 use crate::asset::environment::Environment;
+use crate::bake::links;
+use crate::bounce::LinkedLight;
 use crate::error::Result;
 use crate::gpu::texture::Level;
 use crate::gpu::{Bind, Buffer, Commands, ComputePipeline, Device, TexelView, Texture, Upload};
@@ -82,8 +84,12 @@ pub fn macros(row: ShaderPermutation) -> ShaderPermutation {
     numbers.into_iter().fold(row, |row, (name, value)| row.number(name, value)).define("TAPS", lobe::TAPS as u32)
 }
 
-pub fn gloss_row(texels: bool) -> ShaderPermutation {
-    macros(ShaderPermutation::new("gloss.comp", 4)).define("TEXEL", texels).define("WORKGROUP", CLUSTER_VERTICES)
+/// `links` where light bounces.
+pub fn gloss_row(texels: bool, links: bool) -> ShaderPermutation {
+    links::macros(macros(ShaderPermutation::new("gloss.comp", 4)))
+        .define("TEXEL", texels)
+        .define("LINKS", links)
+        .define("WORKGROUP", CLUSTER_VERTICES)
 }
 
 /// Distant light on the device: see [`SkyMap`].
@@ -117,9 +123,9 @@ pub struct Reflections {
     pub flat: Texture,
     /// The receivers that reflect.
     pub glossy: Vec<Glossy>,
-    /// Workgroups: an entity, and the first of its vertices.
-    groups: Buffer,
-    group_count: u32,
+    /// Clusters that a picture may show: an entity, and the first of its vertices.
+    clusters: Upload,
+    cluster_count: u32,
     /// [`GlossEntity`] of every entity of the scene, as the eye sees it.
     pub entities: Upload,
     /// For every entity the sharp lights that its highlights are of.
@@ -138,6 +144,8 @@ pub struct ReflectionInputs<'b> {
     /// Light of every vertex before bounces, and after them.
     pub direct: &'b Buffer,
     pub radiosity: &'b Buffer,
+    /// What vertices see along their links, where light bounces.
+    pub linked: Option<LinkedLight<'b>>,
 }
 
 /// What drawing shaders read of reflections.
@@ -151,7 +159,7 @@ pub struct DrawnReflections<'b> {
 
 impl Reflections {
     /// For the glossy receivers of a scene of `entity_count` entities, whose buffers of light hold `light_bytes`;
-    /// `texels` where the device reads texels faster than blocks.
+    /// `texels` where the device reads texels faster than blocks, `links` where light bounces.
     pub fn new(
         device: &Arc<Device>,
         library: &Library,
@@ -160,24 +168,19 @@ impl Reflections {
         entity_count: usize,
         light_bytes: u64,
         texels: bool,
+        links: bool,
     ) -> Result<Self> {
-        let groups: Vec<[u32; 2]> = glossy
-            .iter()
-            .flat_map(|of| {
-                (0..of.vertex_count).step_by(CLUSTER_VERTICES as usize).map(|first| [of.entity as u32, first])
-            })
-            .collect();
         let mut shown_lights = vec![[NONE; SHOWN_LIGHTS]; entity_count];
         glossy.iter().for_each(|of| shown_lights[of.entity] = of.lights);
         Ok(Reflections {
-            pipeline: ComputePipeline::new(device, "gloss", &library.shader(&gloss_row(texels))?)?,
+            pipeline: ComputePipeline::new(device, "gloss", &library.shader(&gloss_row(texels, links))?)?,
             texels,
             sky: FilteredSky::new(device, environment)?,
             lobes: texture(device, "lobes", lobe::TABLE as u32, &lobe::texels())?,
             white: texture(device, "white", 1, &[[1.0; 4]])?,
             flat: texture(device, "flat", 1, &[[0.5, 0.5, 1.0, 1.0]])?,
-            group_count: groups.len() as u32,
-            groups: Buffer::with_data(device, "glossy groups", &groups)?,
+            clusters: Upload::new(device, "glossy clusters", 64)?,
+            cluster_count: 0,
             entities: Upload::new(device, "glossy entities", (entity_count * size_of::<GlossEntity>()) as u64)?,
             shown_lights: Buffer::with_data(device, "shown lights", &shown_lights)?,
             through: Buffer::zeros(device, "transfer through", 2 * light_bytes)?,
@@ -187,9 +190,15 @@ impl Reflections {
         })
     }
 
+    /// The clusters that the next picture may show.
+    pub(crate) fn set_clusters(&mut self, clusters: &[[u32; 2]]) -> Result<()> {
+        self.cluster_count = clusters.len() as u32;
+        self.clusters.write(clusters)
+    }
+
     /// Takes over distant light.
     pub fn set_sky(&mut self, environment: &Environment) -> Result<()> {
-        self.sky = FilteredSky::new(&self.groups.device().clone(), environment)?;
+        self.sky = FilteredSky::new(&self.through.device().clone(), environment)?;
         Ok(())
     }
 
@@ -201,9 +210,9 @@ impl Reflections {
     /// Computes what every vertex reflects.
     pub fn record<'r>(&'r self, commands: &mut Commands<'r>, inputs: &ReflectionInputs<'r>) -> Result<()> {
         let read = |buffer: &'r Buffer| Bind::read(self.texels, buffer, QUAD_FORMAT);
-        let resources = [
+        let mut resources = vec![
             Bind::Buffer(&self.entities),
-            Bind::Buffer(&self.groups),
+            Bind::Buffer(&self.clusters),
             read(inputs.vertices)?,
             Bind::Buffer(&self.through),
             Bind::Buffer(&self.sky.products),
@@ -213,7 +222,15 @@ impl Reflections {
             read(inputs.radiosity)?,
             Bind::Buffer(&self.reflected),
         ];
-        commands.dispatch(&self.pipeline, &resources, &(), [self.group_count * CLUSTER_VERTICES, 1, 1])
+        if let Some(linked) = &inputs.linked {
+            resources.extend([
+                Bind::read(self.texels, linked.ranges, vk::Format::R32G32_UINT)?,
+                Bind::read(self.texels, linked.links, vk::Format::R32_UINT)?,
+                read(linked.run_light)?,
+                read(linked.run_places)?,
+            ]);
+        }
+        commands.dispatch(&self.pipeline, &resources, &(), [self.cluster_count * CLUSTER_VERTICES, 1, 1])
     }
 
     /// The two quads of an entity's vertices, as they are stored: `first` is its first vertex.

@@ -2,10 +2,15 @@
 
 use super::lobe::{self, LEVELS, TABLE, TAPS};
 use super::sky_map::{SIDE, SkyMap};
-use super::{LEAST_COSINE, LEAST_HIDDEN, LEAST_SHARE, LEAST_VIEW_Z, MOST_NEARBY, MOST_SHARE, PIXEL_ROUGHNESS, brdf};
+use super::{
+    LEAST_COSINE, LEAST_HIDDEN, LEAST_SHARE, LEAST_VIEW_Z, MOST_NEARBY, MOST_SHARE, MOST_SLOPES, PIXEL_ROUGHNESS,
+    WIDENED, brdf,
+};
+use crate::bounce::twin::SeenLink;
 use crate::sh::basis::values;
 use crate::sh::lobe::clamped_cosine;
 use glam::DVec3;
+use std::f64::consts::PI;
 
 const COUNT: usize = 16;
 
@@ -23,8 +28,10 @@ pub struct TwinVertex {
     pub toward: DVec3,
     /// Transfer at the end of the sky's chain.
     pub through: [f64; COUNT],
-    /// Light that has bounced, from everywhere alike.
-    pub bounced: DVec3,
+    /// Where it stands, world, metres.
+    pub place: DVec3,
+    /// Irradiance over pi of all light that has bounced, and what the links lead to, where light bounces.
+    pub bounced: Option<(DVec3, Vec<SeenLink>)>,
 }
 
 struct Tap {
@@ -85,8 +92,34 @@ impl Twin {
         })
     }
 
-    /// The share of the sky of each colour that gets through, and the factor on light from what stands before it.
-    fn seen(&self, vertex: &TwinVertex, taps: &[Tap]) -> (DVec3, f64) {
+    /// Light that has bounced, as the lobe sees it. `energy` is what the lobe reflects of unit light from everywhere.
+    fn bounced(&self, vertex: &TwinVertex, roughness: f64, energy: f64, [hidden, nearby]: [f64; 2]) -> DVec3 {
+        let Some((bounced, links)) = &vertex.bounced else { return DVec3::ZERO };
+        let alpha = brdf::alpha(roughness).max(brdf::LEAST_ALPHA);
+        let z = vertex.normal.dot(vertex.toward).max(LEAST_VIEW_Z);
+        let mut mean = DVec3::ZERO;
+        let mut lobe = DVec3::ZERO;
+        let mut whole = 0.0;
+        for link in links {
+            let along = (link.middle - vertex.place).normalize_or_zero();
+            let lit = vertex.normal.dot(along).max(LEAST_COSINE);
+            let view_half = (0.5 + 0.5 * along.dot(vertex.toward)).max(0.0).sqrt().max(1e-4);
+            let half_z = (vertex.normal.dot(along + vertex.toward) / (2.0 * view_half)).max(0.0);
+            let slopes = PI * link.share / lit / (4.0 * view_half * half_z.powi(3)).max(1e-30);
+            let widened = alpha * alpha + WIDENED * slopes.min(MOST_SLOPES);
+            let weight = brdf::distribution(widened.sqrt(), half_z) * brdf::visibility(alpha, z, lit);
+            mean += link.share * link.light;
+            lobe += PI * link.share * weight * link.light;
+            whole += PI * link.share * weight;
+        }
+        let [hidden, nearby] = if self.map.scale == 0.0 { [(whole / energy).min(1.0), 1.0] } else { [hidden, nearby] };
+        let kept = (*bounced / mean.max(DVec3::splat(1e-20))).clamp(DVec3::ZERO, DVec3::ONE);
+        hidden * kept * lobe / f64::max(whole, 1e-30) + nearby * (*bounced - mean).max(DVec3::ZERO)
+    }
+
+    /// The share of the sky of each colour that gets through; the share of the lobe that something stands before, and the
+    /// factor on light from there.
+    fn seen(&self, vertex: &TwinVertex, taps: &[Tap]) -> (DVec3, [f64; 2]) {
         let mut lobe = [0.0; COUNT];
         for tap in taps {
             let basis = values(4, tap.toward);
@@ -113,16 +146,17 @@ impl Twin {
         let through = dot(&vertex.through, &lobe) / dot(&cosine, &lobe).max(LEAST_SHARE * whole);
         let hidden = 1.0 - through.clamp(0.0, 1.0);
         let of_cosine = 1.0 - (vertex.through[0] / cosine[0]).clamp(0.0, 1.0);
-        (DVec3::from_slice(&colors), (hidden / of_cosine.max(LEAST_HIDDEN)).min(MOST_NEARBY))
+        (DVec3::from_slice(&colors), [hidden, (hidden / of_cosine.max(LEAST_HIDDEN)).min(MOST_NEARBY)])
     }
 
     /// What the pass writes for a vertex: what is multiplied by the colour of the faced surface, and what is added.
     pub fn vertex(&self, vertex: &TwinVertex, roughness: f64) -> [DVec3; 2] {
         let z = vertex.normal.dot(vertex.toward).max(LEAST_VIEW_Z);
         let taps = self.taps(vertex, z, roughness);
-        let (share, nearby) = self.seen(vertex, &taps);
+        let (share, hidden) = self.seen(vertex, &taps);
         let share = share * f64::from(self.map.scale);
-        let bounced = nearby * vertex.bounced;
+        let energy = taps.iter().map(|tap| tap.weight).sum();
+        let bounced = self.bounced(vertex, roughness, energy, hidden);
         if roughness < f64::from(PIXEL_ROUGHNESS) {
             return [share, bounced];
         }

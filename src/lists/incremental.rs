@@ -224,6 +224,18 @@ impl ClusterLists {
         self.stale.iter().filter(|stale| **stale).count()
     }
 
+    /// Clusters of these receivers, those alone that may be seen where `sights` are given.
+    pub fn clusters_of(
+        &self,
+        receives: &[bool],
+        sights: Option<&[Vec<Sight>]>,
+    ) -> impl Iterator<Item = &layout::Cluster> {
+        let wanted = move |(i, cluster): &(usize, &layout::Cluster)| {
+            receives[cluster.receiver as usize] && sights.is_none_or(|sights| self.is_seen(*i, sights))
+        };
+        self.clusters.iter().enumerate().filter(wanted).map(|(_, cluster)| cluster)
+    }
+
     fn is_seen(&self, cluster: usize, sights: &[Vec<Sight>]) -> bool {
         let receiver = self.clusters[cluster].receiver as usize;
         sights[receiver].iter().any(|sight| sight.may_see(&self.faces[cluster]))
@@ -320,7 +332,7 @@ impl ClusterLists {
     /// What light bounces from onto each cluster at the last update's time. A list begins with [`CUT_HEADER`] words: the
     /// middle of the cluster in the world, from its entity's centre; how many near and far runs of what rests it sees, if
     /// it moves; its first pair and their number. The runs follow, and then entities nearby. All entries but those of the
-    /// header are below their weights ([`RUN_BITS`]).
+    /// header are below their weights.
     ///
     /// The cuts of whole entities that move, of those in `of.movers`, come last.
     pub fn reflectors(&self, of: &Reflectors<'_, impl Iterator<Item = usize> + Clone + Sync>) -> Reflected {

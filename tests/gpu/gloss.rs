@@ -3,6 +3,7 @@
 use super::common::{relative_rms, report};
 use super::stage::{Stage, stage};
 use glam::DVec3;
+use shadow_fields::bake;
 use shadow_fields::bounce::Bounces;
 use shadow_fields::draw::Antialias;
 use shadow_fields::frame;
@@ -42,10 +43,14 @@ fn picture(stage: &Stage, scene: &Scene, options: frame::Options) -> Vec<f32> {
 }
 
 fn by_rays(scene: &Scene, rays: u32) -> RayPicture {
+    by_bouncing_rays(scene, rays, 0)
+}
+
+fn by_bouncing_rays(scene: &Scene, rays: u32, bounces: u32) -> RayPicture {
     let shapes = RayMeshes::new(scene);
     let placements = scene.at(0.0);
     let world = World::new(scene, &shapes, &placements);
-    pixels::picture(&world, SIZE, false, &RayCast { rays, runs: 2, ..RayCast::default() }, &|_| ())
+    pixels::picture(&world, SIZE, false, &RayCast { rays, bounces, runs: 2, ..RayCast::default() }, &|_| ())
 }
 
 /// Relative RMS over the pixels where the scene shows a surface: its background is black.
@@ -134,6 +139,36 @@ fn reflections_past_others_are_those_of_rays() {
         assert!(found < most, "{lines:?}");
     }
     report(&lines.join("\n"));
+}
+
+/// A floor mirrors, roughly, the lit wall behind it and not the bright one beside it.
+#[test]
+fn near_things_are_reflected_where_they_stand() {
+    let Some(stage) = stage() else { return };
+    let scene = scene(
+        r#"
+        mesh = [
+            { name = "floor", plane = { size_m = 4, cells = 24 } },
+            { name = "wall", cuboid = { size_m = [4, 1.5, 0.1], cells = 12 } },
+            { name = "side", cuboid = { size_m = [0.1, 1.5, 4], cells = 12 } },
+            { name = "lamp", sphere = { radius_m = 0.1, subdivisions = 2 } },
+        ]
+        entity = [
+            { mesh = "floor", albedo = [0.05, 0.05, 0.05], gloss = { roughness = 0.3 } },
+            { mesh = "wall", position = [0, 0.75, -1.5], albedo = [0.1, 0.3, 0.8] },
+            { mesh = "side", position = [-1.9, 0.75, 0], albedo = [0.9, 0.9, 0.9] },
+            { mesh = "lamp", position = [-1.5, 0.8, 0.5], emission = [40, 40, 40], receives = false },
+        ]
+        "#,
+    );
+    let bake = bake::Options { groups: true, ..bake::Options::default() };
+    let found = picture(&stage, &scene, frame::Options { bounces: Bounces::One, bake, ..options() });
+    let wanted = by_bouncing_rays(&scene, 256, 1);
+    let floor = 3 * (SIZE[0] * SIZE[1] / 2) as usize..;
+    let error = error(&found[floor.clone()], &wanted.linear[floor]);
+    println!("{error:.4}");
+    // Without their places 0.38.
+    assert!(error < 0.3, "{error}");
 }
 
 /// The eye changes what is reflected, and nothing is merged for it.

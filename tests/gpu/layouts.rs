@@ -49,7 +49,7 @@ fn merge() -> Vec<(Variant, Reflection)> {
 
 #[test]
 fn glossy_entities() {
-    let reflection = library().shader(&gloss_row(false)).unwrap().reflection;
+    let reflection = library().shader(&gloss_row(false, true)).unwrap().reflection;
     same_layout!(
         reflection,
         GlossEntity {

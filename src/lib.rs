@@ -51,7 +51,8 @@
 //!   what moves around it for the light that comes from there ([`bounce`]). All that reflects passes its base colour's
 //!   share of light on as a diffuse surface does, metals too.
 //! - Gloss: roughness, metal and a base colour as in glTF ([`gloss`]). The merge leaves the transfer past everything, of
-//!   which the share of a reflected sky follows for any view; bounced light fills the rest of a lobe alike.
+//!   which the share of a reflected sky follows for any view. The rest of a lobe is filled with bounced light: along a
+//!   vertex's links by where they lead, and alike with that of what moves.
 //! - Light: it is linear Rec.709 radiance. The radiosity is B = albedo/pi * integral of L V max(0, n.w) dw.
 //! - Numbers: tables are made in f64, shaders compute in f32, and fields are stored as f16 or f32.
 //!

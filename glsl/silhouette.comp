@@ -1,6 +1,6 @@
 #version 460
 #extension GL_EXT_samplerless_texture_functions : require
-// Views of an object to maps of signed distance and depth, in two steps. The outline is known at points between
+// Views of an object, or of half of it, to maps of signed distance and depth, in two steps. The outline is known at points between
 // neighbouring pixels of which one is covered; these points lie in 2 VIEW - 1 columns: half a pixel apart, alternately
 // between vertical and between horizontal neighbours.
 //   COLUMNS: for every column and every row of the map, the nearest point of the outline in that column.
@@ -110,14 +110,21 @@ uint texel(uint view, ivec2 at) {
     // Inside where most of the pixels around the texel's centre are covered; 0 where as many are as are not.
     ivec2 low = ivec2(floor(place - 0.25));
     ivec2 high = ivec2(floor(place + 0.25));
-    ivec2 corner = origin(view);
     int inside = 0;
-    inside += covered(seen(corner + low)) ? 1 : -1;
-    inside += covered(seen(corner + ivec2(high.x, low.y))) ? 1 : -1;
-    inside += covered(seen(corner + ivec2(low.x, high.y))) ? 1 : -1;
-    inside += covered(seen(corner + high)) ? 1 : -1;
+    vec2 surface = vec2(0.0); // sum of its depths, and their number
+    for (int k = 0; k < 4; k++) {
+        ivec2 beside = ivec2((k & 1) == 0 ? low.x : high.x, (k & 2) == 0 ? low.y : high.y);
+        vec2 depths = seen(origin(view) + beside);
+        inside += covered(depths) ? 1 : -1;
+        surface += covered(depths) ? vec2(depth_of(depths, depths), 1.0) : vec2(0.0);
+    }
     float signed_distance = sqrt(least) * float(sign(inside));
-    vec2 scaled = clamp(vec2(signed_distance / REACH, depth.x / depth.y), -1.0, 1.0) * 127.0;
+    float found_depth = depth.x / depth.y;
+#if HALF
+    float within = smoothstep(SURFACE_FROM, SURFACE_TO, signed_distance);
+    found_depth = mix(found_depth, surface.x / max(surface.y, 1.0), within);
+#endif
+    vec2 scaled = clamp(vec2(signed_distance / REACH, found_depth), -1.0, 1.0) * 127.0;
     ivec2 bytes = ivec2(roundEven(scaled)) & 0xff;
     return uint(bytes.x | bytes.y << 8);
 }

@@ -30,7 +30,13 @@ fn baking() -> Vec<ShaderPermutation> {
     let project = BANDS.flat_map(|bands| KINDS.map(|kind| Project::row(bands, kind)));
     let assemble = [Storage::F16, Storage::F32].map(Assemble::row);
     let capture = KINDS.into_iter().flat_map(Capture::rows);
-    project.chain([Raster::row()]).chain(assemble).chain(capture).chain(Silhouette::permutations(32, 128, 16)).collect()
+    project
+        .chain([Raster::row()])
+        .chain(assemble)
+        .chain(capture)
+        .chain(Silhouette::permutations(32, 128, 16, false))
+        .chain(Silhouette::permutations(16, 64, 16, true))
+        .collect()
 }
 
 fn bouncing() -> Vec<ShaderPermutation> {

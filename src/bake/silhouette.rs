@@ -10,7 +10,7 @@ use super::triangles::unit_positions;
 use super::{BakeReport, Baker, Progress, hash_text, levels};
 use crate::asset::mesh::Mesh;
 use crate::error::{Error, Result};
-use crate::field::silhouette::{MapFrame, REACH, Side, SilhouetteField, SilhouetteHeader, encode};
+use crate::field::silhouette::{MapFrame, REACH, SURFACE, Side, SilhouetteField, SilhouetteHeader, encode};
 use crate::field::silhouette_nodes::NodeGrid;
 use crate::gpu::{
     Access, Bind, Buffer, BufferKind, Commands, ComputePipeline, Device, GraphicsPipeline, GraphicsState, Image,
@@ -156,8 +156,8 @@ impl SilhouetteBuffers {
 }
 
 impl Silhouette {
-    /// The permutations: vertex, fragment, and the two steps of the reduction.
-    pub fn permutations(map_px: u32, view_px: u32, atlas_columns: u32) -> [ShaderPermutation; 4] {
+    /// The permutations: vertex, fragment, and the two steps of the reduction, of wholes or of halves.
+    pub fn permutations(map_px: u32, view_px: u32, atlas_columns: u32, half: bool) -> [ShaderPermutation; 4] {
         let reduce = |columns: bool| {
             ShaderPermutation::new("silhouette.comp", 4)
                 .define("COLUMNS", columns)
@@ -165,8 +165,11 @@ impl Silhouette {
                 .define("MAP", map_px)
                 .define("VIEW", view_px)
                 .define("ATLAS_COLUMNS", atlas_columns)
+                .define("HALF", half)
                 .number("CLEAR", CLEAR.into())
                 .number("REACH", REACH)
+                .number("SURFACE_FROM", SURFACE[0])
+                .number("SURFACE_TO", SURFACE[1])
         };
         [
             ShaderPermutation::new("silhouette.vert", 4),
@@ -176,8 +179,8 @@ impl Silhouette {
         ]
     }
 
-    /// The pipelines for maps and views of these edges.
-    pub fn new(device: &Arc<Device>, library: &Library, map_px: u32, view_px: u32) -> Result<Self> {
+    /// The pipelines for maps and views of these edges, of wholes or of halves.
+    pub fn new(device: &Arc<Device>, library: &Library, map_px: u32, view_px: u32, half: bool) -> Result<Self> {
         let most = device.most_image_px();
         if view_px > most {
             return Err(Error::Input(format!("views of {view_px} px are larger than the device's images ({most} px)")));
@@ -185,7 +188,7 @@ impl Silhouette {
         let atlas_columns = (ATLAS_PX.min(most) / view_px).max(1);
         let edge = atlas_columns * view_px;
         let shape = ImageShape { format: vk::Format::R16G16_SFLOAT, width: edge, height: edge, samples: 1 };
-        let [vertex, fragment, columns, rows] = Self::permutations(map_px, view_px, atlas_columns);
+        let [vertex, fragment, columns, rows] = Self::permutations(map_px, view_px, atlas_columns, half);
         let state = GraphicsState { keeps: Keeps::Largest, ..GraphicsState::plain(shape.format) };
         let vertex = library.shader(&vertex)?;
         let fragment = library.shader(&fragment)?;
@@ -291,7 +294,8 @@ pub fn bake_silhouette(
     let mut report = BakeReport::default();
     for sides in sizes {
         let map_px = header.edge_px(sides[0]) as u32;
-        let pass = Silhouette::new(device, library, map_px, options.view_px * map_px / options.map_px)?;
+        let view_px = options.view_px * map_px / options.map_px;
+        let pass = Silhouette::new(device, library, map_px, view_px, sides[0] != Side::Whole)?;
         let buffers = SilhouetteBuffers::new(device, mesh, &triangles, &frames, map_px)?;
         for &side in *sides {
             for (batch, frames) in frames.chunks(pass.capacity()).enumerate() {
@@ -354,9 +358,16 @@ pub fn silhouette_twin(mesh: &Mesh, (frame, side): (&MapFrame, Side), map_px: u3
         let (sum, count) = nearest.fold((0.0, 0.0), |(sum, count), depth| (sum + depth, count + 1.0));
         let around =
             [-0.25, 0.25].map(|dy| [-0.25, 0.25].map(|dx| (place + DVec2::new(dx, dy)).floor().as_usizevec2()));
-        let inside: i32 = around.iter().flatten().map(|p| if view[p.y * px + p.x].is_some() { 1 } else { -1 }).sum();
-        let distance = least.sqrt().min(f64::MAX) * f64::from(inside.signum());
-        [encode(distance, REACH), encode(sum / f64::max(count, 1.0), 1.0)]
+        let covered: Vec<(f64, f64)> = around.iter().flatten().filter_map(|p| view[p.y * px + p.x]).collect();
+        let inside = (covered.len() as i32 - 2).signum();
+        let distance = least.sqrt().min(f64::MAX) * f64::from(inside);
+        let mut depth = sum / f64::max(count, 1.0);
+        if side != Side::Whole && !covered.is_empty() {
+            let surface = covered.iter().map(|(low, high)| (low + high) / 2.0).sum::<f64>() / covered.len() as f64;
+            let within = ((distance - SURFACE[0]) / (SURFACE[1] - SURFACE[0])).clamp(0.0, 1.0);
+            depth += (surface - depth) * within * within * (3.0 - 2.0 * within);
+        }
+        [encode(distance, REACH), encode(depth, 1.0)]
     };
     (0..map_px * map_px).into_par_iter().map(texel).collect()
 }

@@ -13,7 +13,7 @@
 //!
 //! Within the bounding sphere a part of the object may lie behind the receiver, or beyond the light, and its outline
 //! hides that of the rest. So a mesh that is not convex has maps of its two halves besides ([`Side`]), at half the
-//! resolution. Each half counts as far as its outline lies between receiver and light; where both do, the whole counts.
+//! resolution. Well within a half's outline its map has the depth of the half itself ([`SURFACE`]). Each half counts as far as its outline lies between receiver and light; where both do, the whole counts.
 //! Lights of 3 degrees in the middle of a ring have errors of 0.01 with halves and of 0.26 without.
 //!
 //! For a convex mesh that is no ball the field keeps a box instead. A slab's nearest rim may lie before a receiver that
@@ -46,6 +46,10 @@ pub const DEEP: [f64; 2] = [-0.6, -0.2];
 /// behind that for the half to count. The outline of a half that is cut there tells of the cut: a bulb right before it
 /// shone through the dome around it, and one right behind was hidden by the dome's top, as seen from below.
 pub const HALF_DEPTH: f64 = 0.15;
+/// Distance within the outline of a half, in r, up to which its map has the depth of the outline's nearest point, and
+/// from which it has that of the half's middle on the ray. A bulb high in a dome lies before the dome's rim and behind
+/// its top: by the rim alone it shone through the top.
+pub const SURFACE: [f64; 2] = [0.05, 0.25];
 /// Coordinate in r from which on a convex object reaches so far toward its bounding sphere that a box tells nothing
 /// more.
 pub const ROUND: f64 = 0.9;

@@ -74,12 +74,15 @@ fn a_room_of_one_mesh_is_lit_by_its_ceiling_lamp() {
 #[test]
 fn no_light_comes_through_a_lamp_shade() {
     let Some(stage) = stage() else { return };
-    // A ring that is open above and below, and a dome with the bulb up to 0.2 radii above the middle of its sphere.
+    // A ring that is open above and below, and a dome with the bulb up to 0.4 radii above the middle of its sphere: the
+    // highest lies before its rim as seen from above, and shone through its top.
     let ring = [[0.28, -0.15], [0.16, 0.15], [0.15, 0.15], [0.27, -0.15]];
     let dome = [[0.28, -0.15], [0.05, 0.15], [0.002, 0.15], [0.002, 0.14], [0.045, 0.14], [0.27, -0.15]];
-    for (profile, height) in [(&ring[..], 0.62), (&dome[..], 0.5), (&dome[..], 0.54), (&dome[..], 0.58)] {
+    let dome_heights = [(0.5, 0.03), (0.54, 0.03), (0.58, 0.03), (0.64, 0.15)];
+    let in_dome = dome_heights.map(|(height, most)| (&dome[..], height, most));
+    for (profile, height, most) in [(&ring[..], 0.62, 0.03)].into_iter().chain(in_dome) {
         let error = picture_error(&stage, &under_a_shade(profile, height));
-        assert!(error < 0.03, "{height}: {error}");
+        assert!(error < most, "{height}: {error}");
     }
 }
 

@@ -1,8 +1,8 @@
 #version 460
 #extension GL_EXT_samplerless_texture_functions : require
-// Views of an object, or of half of it, to maps of signed distance and depth, in two steps. The outline is known at points between
-// neighbouring pixels of which one is covered; these points lie in 2 VIEW - 1 columns: half a pixel apart, alternately
-// between vertical and between horizontal neighbours.
+// Views of an object, or of half of it, to maps of signed distance and depth, in two steps. The outline is known at
+// points between neighbouring pixels of which one is covered; these points lie in 2 VIEW - 1 columns: half a pixel
+// apart, alternately between vertical and between horizontal neighbours.
 //   COLUMNS: for every column and every row of the map, the nearest point of the outline in that column.
 //   otherwise: for every texel of the map, the nearest of these over all columns.
 // This is the exact two-pass distance transform of Meijster, Roerdink and Hesselink, "A General Algorithm for Computing

@@ -112,7 +112,7 @@ impl SilhouetteHeader {
         if !(self.map_px..=1024).contains(&self.view_px) || !self.view_px.is_multiple_of(self.map_px) {
             return bad(format!("views of {} px for maps of {} px", self.view_px, self.map_px));
         }
-        if self.half_px != 0 && 2 * self.half_px != self.map_px {
+        if self.half_px != 0 && self.half_px != self.map_px / 2 {
             return bad(format!("maps of halves of {} px beside maps of {} px", self.half_px, self.map_px));
         }
         let usable = self.centre_m.iter().all(|c| c.is_finite()) && self.radius_m > 0.0 && self.radius_m.is_finite();

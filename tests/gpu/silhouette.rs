@@ -6,7 +6,7 @@ use glam::{DVec3, Vec3};
 use shadow_fields::asset::Mesh;
 use shadow_fields::bake::silhouette::{SilhouetteOptions, bake_silhouette};
 use shadow_fields::check::silhouette as check;
-use shadow_fields::field::silhouette::{SilhouetteField, decode, encode};
+use shadow_fields::field::silhouette::{SilhouetteField, SilhouetteHeader, decode, encode};
 use shadow_fields::field::sub_light::SeenLight;
 use shadow_fields::truth::ray_mesh::RayMesh;
 
@@ -245,6 +245,9 @@ fn a_file_keeps_everything_and_its_header_is_not_believed() {
     assert!(SilhouetteField::new(header.clone(), field.payload().to_vec()).is_err(), "maps are missing");
     header.cells = u32::MAX;
     assert!(SilhouetteField::new(header, field.payload().to_vec()).is_err(), "cells are out of range");
+    // Twice as many are 2 within 32 bits.
+    let header = SilhouetteHeader { half_px: (1 << 31) + 1, ..field.header.clone() };
+    assert!(SilhouetteField::new(header, field.payload().to_vec()).is_err(), "halves are out of range");
 }
 
 /// What is stored lies as near as a byte can to the number.

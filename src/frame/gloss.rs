@@ -90,6 +90,9 @@ pub(super) fn detail(entity: &Entity) -> Option<Detail> {
 impl Frame {
     /// The glossy entities as the scene's camera sees them, and their clusters that viewports may show.
     pub(super) fn prepare_gloss(&mut self, placements: &[Placement], viewports: &[Viewport]) -> Result<()> {
+        if self.reflections.is_none() {
+            return Ok(());
+        }
         let sights = if self.options.skip.hidden { self.sights(placements, viewports) } else { None };
         let Some(reflections) = &mut self.reflections else { return Ok(()) };
         let eye = self.scene.data.camera.eye;
@@ -152,8 +155,8 @@ impl Frame {
         self.reflections.as_ref().map(|reflections| (reflections, inputs))
     }
 
-    /// What the vertices of an entity reflect in the last picture, as they are stored, where nothing is skipped, and what the twin finds by the
-    /// same transfer.
+    /// What the vertices of an entity reflect in the last picture, as they are stored, and what the twin finds by the
+    /// same transfer and the same light of links. Vertices that a picture skipped are stored as they were.
     pub fn reflections_beside_twin(&self, entity: usize, placements: &[Placement]) -> Result<[Vec<[DVec3; 2]>; 2]> {
         let Some(reflections) = &self.reflections else { return Ok([Vec::new(), Vec::new()]) };
         let surface = self.buffers.surface(entity);
@@ -167,7 +170,7 @@ impl Frame {
         let found = reflections.read(first, vertex_count)?;
         let found = found.iter().map(|pair| pair.map(|[r, g, b, _]| DVec3::new(r.into(), g.into(), b.into())));
         let through = reflections.read_through(first, vertex_count)?;
-        let bounced = self.bounced_beside_links(first, entity, vertex_count)?;
+        let bounced = self.bounced_and_links(first, entity, vertex_count)?;
         let wanted = surface.order.iter().zip(through).zip(bounced).map(|((&v, through), bounced)| {
             let place = placement.point(mesh.positions[v as usize].as_dvec3());
             let normal = (placement.turn() * mesh.normals[v as usize].as_dvec3()).normalize();
@@ -178,7 +181,7 @@ impl Frame {
     }
 
     /// Of each vertex of an entity, the irradiance over pi of light that has bounced, and what its links lead to.
-    fn bounced_beside_links(
+    fn bounced_and_links(
         &self,
         first: usize,
         entity: usize,

@@ -17,8 +17,8 @@ READ_UINT(1, Entries, entries, entry_at)
 #include "field.glsl"
 #define LEAVING_BINDING 4
 #include "leaving.glsl"
-READ_UVEC2(5, Pairs, pairs, pair_at) // cluster; mover below its weight
-layout(std430, binding = 6) writeonly buffer Spheres { vec4 spheres[]; };
+READ_UVEC2(6, Pairs, pairs, pair_at) // cluster; mover below its weight
+layout(std430, binding = 7) writeonly buffer Spheres { vec4 spheres[]; };
 layout(push_constant) uniform Push { uint count; } push;
 
 void main() {
@@ -44,5 +44,5 @@ void main() {
     vec3 centre = middle - length(to) * to_world(mover, direction);
     float weight = mover.opacity * link_share(pair.y);
     spheres[2 * i] = vec4(centre, square);
-    spheres[2 * i + 1] = vec4(seen(e, direction), weight);
+    spheres[2 * i + 1] = vec4(seen(e, from, direction), weight);
 }

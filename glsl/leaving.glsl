@@ -1,11 +1,28 @@
-// The light that leaves what moves, by direction, as outgoing.comp wrote it. LEAVING_BINDING says where it lies.
+// The light that leaves what moves, as outgoing.comp wrote it. LEAVING_BINDING says where it lies.
 #include "readable.glsl"
-// Nine coefficients an entity, in its frame: area times light; area.
+// Nine quads an entity, area times light and area: coefficients by direction, in its frame, or six faces of a box.
 READ_VEC4(LEAVING_BINDING, Outgoing, outgoing, outgoing_at)
+// Three quads an entity: halves of a box's edges, in its frame and in r; zero of what is none.
+READ_VEC4(LEAVING_BINDING + 1, Edges, edges, edge_at)
 
-// Mean radiosity of those surfaces of a mover that are seen along a direction, which comes from the mover in its frame:
-// the light that leaves it that way, over its area as seen from there.
-vec3 seen(uint e, vec3 direction) {
+// Mean radiosity of the faces of a box that are seen from a place in its frame, in r, by about the views that they take.
+vec3 seen_faces(uint e, vec3 from) {
+    vec4 sum = vec4(0.0);
+    [[unroll]] for (uint f = 0; f < 6; f++) {
+        vec3 edge = (f % 2 == 0 ? 1.0 : -1.0) * edge_at(3 * e + f / 2).xyz;
+        vec3 to = from - edge;
+        float height = dot(to, edge) * inversesqrt(dot(edge, edge));
+        sum += (max(height, 0.0) + UNFACED) * pow(dot(to, to) + UNFACED, -1.5) * outgoing_at(9 * e + f);
+    }
+    return sum.rgb / max(sum.w, 1e-20);
+}
+
+// Mean radiosity of those surfaces of a mover that are seen from a place in its frame, in r. By direction, which is about
+// that of the place, it is the light that leaves the mover that way, over its area as seen from there.
+vec3 seen(uint e, vec3 from, vec3 direction) {
+    if (edge_at(3 * e).xyz != vec3(0.0)) {
+        return seen_faces(e, from);
+    }
     float y[COEFFICIENTS];
     sh_basis(direction, y);
     vec4 sum = vec4(0.0);

@@ -6,3 +6,13 @@ uint link_number(uint packed) {
 float link_share(uint packed) {
     return uintBitsToFloat((packed >> RUN_BITS) + LEAST_SHARE_BITS << 16);
 }
+
+uint packed_link(float share, uint number) {
+    uint bits = floatBitsToUint(share) + (1u << 15) >> 16;
+    return max(bits, LEAST_SHARE_BITS) - LEAST_SHARE_BITS << RUN_BITS | number;
+}
+
+// Not quite of unit length.
+vec3 unpacked_direction(uint packed) {
+    return vec3(packed & 1023u, packed >> 10 & 1023u, packed >> 20) / 511.5 - 1.0;
+}

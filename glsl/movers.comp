@@ -18,14 +18,14 @@ READ_VEC4(6, Transfers, transfers, transfer_quad)
 READ_VEC4(7, Vertices, vertices, vertex_quad)
 #define LEAVING_BINDING 8
 #include "leaving.glsl"
-layout(std430, binding = 9) writeonly buffer Incoming { vec4 incoming[]; }; // share times radiosity; share taken
+layout(std430, binding = 10) writeonly buffer Incoming { vec4 incoming[]; }; // share times radiosity; share taken of links
 #if SELF
-READ_UVEC2(10, SelfCells, self_cells, self_cell)
+READ_UVEC2(11, SelfCells, self_cells, self_cell)
 #include "blocked_share.glsl"
 #include "bytes.glsl"
 #include "self_visibility.glsl"
 #endif
-READ_VEC4(11, Spheres, spheres, sphere_at) // two a distant mover: from the receiver's centre, square of its radius; light, weight
+READ_VEC4(12, Spheres, spheres, sphere_at) // two a distant mover: from the receiver's centre, square of its radius; light, weight
 #include "merge_cone.glsl"
 
 // The receiver's side of a vertex, in its own frame.
@@ -107,6 +107,7 @@ void main() {
     vec3 middle = uintBitsToFloat(uvec3(entry_at(first), entry_at(first + 1), entry_at(first + 2)));
     uint near_count = entry_at(first + 3), far_count = entry_at(first + 4);
     uint sphere_first = entry_at(first + 5), sphere_count = entry_at(first + 6);
+    uint near_boxes = entry_at(first + 7), distant_boxes = entry_at(first + 8);
     first += CUT_HEADER;
     if (far_count > 0) {
         sum_far(receiver, receiver.centre.xyz + middle, v, first + near_count, far_count);
@@ -142,8 +143,9 @@ void main() {
         at_rest += max(far, 0.0);
     }
     vec3 sum = vec3(0.0);
-    float taken = 0.0;
-    for (uint i = sphere_first; i < sphere_first + sphere_count; i++) {
+    float taken = 0.0, hidden = 0.0; // of the latter links know already
+    for (uint s = 0; s < sphere_count; s++) {
+        uint i = sphere_first + s;
         vec4 sphere = sphere_at(2 * i), light = sphere_at(2 * i + 1);
         vec3 to = sphere.xyz - position;
         float distance = length(to);
@@ -153,8 +155,10 @@ void main() {
         share *= own_visible(own, to_object(receiver, toward), sine, distance * receiver.centre.w);
         sum += share * light.rgb;
         taken += share;
+        hidden += s < distant_boxes ? share : 0.0;
     }
-    for (uint i = first + near_count + far_count; i < end; i++) {
+    first += near_count + far_count;
+    for (uint i = first; i < end; i++) {
         uint packed = entry_at(i), e = link_number(packed);
         Entity mover = ENTITY(e);
         mover.centre.xyz -= receiver.centre.xyz;
@@ -172,11 +176,12 @@ void main() {
         share *= above_horizon(cone, normal) * mover.opacity * link_share(packed) / PI;
         share *= own_visible(own, to_object(receiver, cone.toward), cone.sine, cone.distance * receiver.centre.w);
         share = max(share, 0.0);
-        sum += share * seen(e, seen_from(from, b));
+        sum += share * seen(e, from, seen_from(from, b));
         taken += share;
+        hidden += i < first + near_boxes ? share : 0.0;
     }
     // Things that stand before each other take no more than the hemisphere.
     float scale = 1.0 / max(taken, 1.0);
-    taken *= scale;
-    incoming[cluster.radiosity_first + v] = vec4(within_hemisphere(at_rest) * (1.0 - taken) + sum * scale, taken);
+    vec3 light = within_hemisphere(at_rest) * (1.0 - taken * scale) + sum * scale;
+    incoming[cluster.radiosity_first + v] = vec4(light, (taken - hidden) * scale);
 }

@@ -1,6 +1,6 @@
 #version 460
-// The light that leaves what moves, by direction: a workgroup adds up the runs of vertices of one entity, with the light
-// that they receive from what rests. Of src/bounce/movers.rs.
+// The light that leaves what moves, by direction or by a box's faces: a workgroup adds up the runs of vertices of one
+// entity, with the light that they receive from what rests. Of src/bounce/movers.rs.
 #include "merge_layout.glsl"
 layout(local_size_x = RUNS) in;
 
@@ -13,11 +13,11 @@ struct Mover {
 struct Run {
     vec4 middle;    // in r, in the entity's frame; number
     vec4 normal;    // mean
-    vec4 lobe[3];   // its area by direction: nine coefficients
+    vec4 areas[3];  // its area by direction, nine coefficients, or by the six faces of a box
 };
 layout(std430, binding = 4) readonly buffer Movers { Mover movers[]; };
 layout(std430, binding = 5) readonly buffer Runs { Run runs[]; };
-layout(std430, binding = 6) writeonly buffer Outgoing { vec4 outgoing[]; }; // nine coefficients an entity: times light; area
+layout(std430, binding = 6) writeonly buffer Outgoing { vec4 outgoing[]; }; // nine quads an entity: area times light; area
 layout(push_constant) uniform Push { uint bounced; } push;
 
 shared vec3 light[RUNS];
@@ -39,7 +39,7 @@ void main() {
     if (i < 9) {
         vec4 sum = vec4(0.0);
         for (uint run = 0; run < mover.run_count; run++) {
-            sum += runs[mover.run_first + run].lobe[i / 4][i % 4] * vec4(light[run], 1.0);
+            sum += runs[mover.run_first + run].areas[i / 4][i % 4] * vec4(light[run], 1.0);
         }
         outgoing[9 * mover.entity + i] = sum;
     }

@@ -10,9 +10,8 @@
 READ_VEC4(NODE_BINDING, Nodes, nodes, node_quad)
 READ_UVEC2(NODE_BINDING + 1, Cells, cells, cell_at)
 #include "cube.glsl"
-#include "blocked_share.glsl"
 #include "bytes.glsl"
-#include "slabs.glsl"
+#include "outline.glsl"
 
 const uint BOX_QUADS = 2;
 const uint WHOLE = 0, FAR = 1, NEAR = 2; // sides of an object: all of it, what lies beyond its centre along a direction, and before it
@@ -146,16 +145,6 @@ vec2 outline(NearMap near, uint side, vec3 along, vec3 foot) {
     return vec2(distance, near.sign * between(cell.y, weights));
 }
 
-// 1 where a length (in r) is positive and 0 where it is negative, with a ramp between.
-float fade(float l) {
-    return clamp(l / NEAREST + 0.5, 0.0, 1.0);
-}
-
-// Share of a small round light that an outline blocks which lies that far away, in r.
-float share_blocked(float distance, float away, float tangent) {
-    return blocked_share(distance / max(max(away, NEAREST) * tangent, LEAST_PENUMBRA));
-}
-
 // Where a ray enters the box around an object and where it leaves it. If it misses the box, the interval has no ends,
 // and the outline alone decides.
 vec2 through_box(uint field, vec3 point, vec3 direction) {
@@ -164,20 +153,5 @@ vec2 through_box(uint field, vec3 point, vec3 direction) {
     return ends.x > ends.y ? vec2(-NO_BOX, NO_BOX) : ends;
 #else
     return vec2(-NO_BOX, NO_BOX);
-#endif
-}
-
-// How far an outline counts that lies that far away: 0 behind the point or beyond the limit, 1 between them. Its
-// nearest point may lie off the ray, and the object then stands where the ray passes its box: all of it, where the ray
-// enters and leaves the box between point and limit, with a ramp where the box reaches beyond either.
-float counts_between(float away, float limit, vec2 in_box) {
-#if BOXES || CUBOIDS
-    bool apart = in_box[1] < TOUCHING || in_box[0] > limit - TOUCHING;
-    away = min(max(away, in_box[0]), in_box[1]);
-    float begins = max(fade(away), clamp(1.0 + in_box[0] / NEAREST, 0.0, 1.0));
-    float ends = max(fade(limit - away), clamp(1.0 - (in_box[1] - limit) / NEAREST, 0.0, 1.0));
-    return apart ? 0.0 : begins * ends;
-#else
-    return fade(away) * fade(limit - away);
 #endif
 }

@@ -8,6 +8,7 @@ use shadow_fields::bake::capture::Capture;
 use shadow_fields::bake::project::Project;
 use shadow_fields::bake::raster::Raster;
 use shadow_fields::bake::silhouette::{Silhouette, SilhouetteOptions};
+use shadow_fields::bounce::boxes::hidden_row;
 use shadow_fields::bounce::movers::{distant_row, movers_row, outgoing_row};
 use shadow_fields::bounce::{bounce_row, runs_row};
 use shadow_fields::draw::grid::DrawGrid;
@@ -54,7 +55,13 @@ fn bouncing() -> Vec<ShaderPermutation> {
     let usual = usual_permutation();
     let of_movers = |variant: &Variant| {
         let merge = MergePermutation { variant: *variant, ..usual };
-        [outgoing_row(&merge), distant_row(&merge), movers_row(&merge, false), movers_row(&merge, true)]
+        [
+            outgoing_row(&merge),
+            distant_row(&merge),
+            hidden_row(&merge),
+            movers_row(&merge, false),
+            movers_row(&merge, true),
+        ]
     };
     let few = MergePermutation { bands: 2, ..usual };
     let movers = VARIANTS.iter().flat_map(of_movers).chain([movers_row(&few, true)]);

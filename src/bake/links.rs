@@ -9,6 +9,7 @@
 //! hemisphere that shows fronts of the group.
 
 use crate::shaders::ShaderPermutation;
+use glam::Vec3;
 use std::ops::Range;
 
 /// Vertices of a run, in the order of clusters: the smallest runs, clusters, and groups of those.
@@ -33,6 +34,18 @@ pub fn pack(share: f32, number: u32) -> Option<u32> {
 pub fn unpack(packed: u32) -> (usize, f32) {
     let share = f32::from_bits(((packed >> RUN_BITS) + LEAST_SHARE_BITS) << 16);
     ((packed & ((1 << RUN_BITS) - 1)) as usize, share)
+}
+
+/// A direction, ten bits an axis.
+pub fn pack_direction(toward: Vec3) -> u32 {
+    let [x, y, z] = toward.normalize_or_zero().to_array().map(|c| ((c + 1.0) * 511.5).round() as u32);
+    x | y << 10 | z << 20
+}
+
+/// Not quite of unit length.
+pub fn unpack_direction(packed: u32) -> Vec3 {
+    let axis = |shift: u32| (packed >> shift & 1023) as f32 / 511.5 - 1.0;
+    Vec3::new(axis(0), axis(10), axis(20))
 }
 
 /// The macros of shaders that read links.
@@ -108,55 +121,83 @@ pub struct Met {
     pub member: u32,
     /// The vertex that is nearest to the place, by its place in the order of clusters.
     pub place: u32,
+    /// Direction of the ray.
+    pub toward: Vec3,
     /// Share of the cosine-weighted hemisphere.
     pub share: f32,
-    /// Whether its light counts however small its share is.
-    pub bright: bool,
+    /// Whether it is linked by itself, however small its share is.
+    pub apart: bool,
 }
 
-/// The links of one vertex, of which the rays met that. Each has the number of a run and its share.
-pub fn links(mut met: Vec<Met>, runs: &Runs) -> Vec<u32> {
-    met.sort_unstable_by_key(|met| (!met.bright, met.member, met.place));
-    let (bright, others) = met.split_at(met.partition_point(|met| met.bright));
+/// Rays that go to one run.
+#[derive(Clone, Copy, Default)]
+struct Bundle {
+    share: f32,
+    /// Sum of their directions by their shares.
+    toward: Vec3,
+}
+
+impl Bundle {
+    fn of(bundles: impl IntoIterator<Item = Bundle>) -> Self {
+        let add = |a: Bundle, b: Bundle| Bundle { share: a.share + b.share, toward: a.toward + b.toward };
+        bundles.into_iter().fold(Bundle::default(), add)
+    }
+}
+
+/// A link of a vertex.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Link {
+    /// The number of a run, and its share.
+    pub packed: u32,
+    /// Mean direction of its rays.
+    pub direction: u32,
+}
+
+/// The links of one vertex, of which the rays met that.
+pub fn links(mut met: Vec<Met>, runs: &Runs) -> Vec<Link> {
+    met.sort_unstable_by_key(|met| (!met.apart, met.member, met.place));
+    let (apart, others) = met.split_at(met.partition_point(|met| met.apart));
     let mut links = Vec::new();
-    // Light varies so much there that no run stands for others.
-    link(0, bright, runs, &mut links);
+    link(0, apart, runs, &mut links);
     let first = links.len();
     link(RUNS.len() - 1, others, runs, &mut links);
     if links.len() > MOST_LINKS {
         keep_largest(&mut links, if first < MOST_LINKS { first } else { 0 });
     }
-    links.into_iter().filter_map(|(number, share)| pack(share, number)).collect()
+    let link = |(number, bundle): (u32, Bundle)| {
+        Some(Link { packed: pack(bundle.share, number)?, direction: pack_direction(bundle.toward) })
+    };
+    links.into_iter().filter_map(link).collect()
 }
 
 /// Links runs of at most this size.
-fn link(largest: usize, met: &[Met], runs: &Runs, links: &mut Vec<(u32, f32)>) {
+fn link(largest: usize, met: &[Met], runs: &Runs, links: &mut Vec<(u32, Bundle)>) {
     for of_largest in met.chunk_by(|a, b| is_one(largest, a, b)) {
         let rest = join(largest, of_largest, runs, links);
-        links.extend(rest.filter(|rest| *rest > 0.0).map(|rest| (runs.of(largest, of_largest), rest)));
+        links.extend(rest.filter(|rest| rest.share > 0.0).map(|rest| (runs.of(largest, of_largest), rest)));
     }
 }
 
 /// Leaves [`MOST_LINKS`]; the largest of those from `first` on take over the shares of the others.
-fn keep_largest(links: &mut Vec<(u32, f32)>, first: usize) {
-    let share = |links: &[(u32, f32)]| links.iter().map(|(_, share)| share).sum::<f32>();
+fn keep_largest(links: &mut Vec<(u32, Bundle)>, first: usize) {
+    let share = |links: &[(u32, Bundle)]| links.iter().map(|(_, bundle)| bundle.share).sum::<f32>();
     let all = share(&links[first..]);
-    links[first..].select_nth_unstable_by(MOST_LINKS - first, |a, b| b.1.total_cmp(&a.1));
+    links[first..].select_nth_unstable_by(MOST_LINKS - first, |a, b| b.1.share.total_cmp(&a.1.share));
     links.truncate(MOST_LINKS);
     let kept = share(&links[first..]);
-    links[first..].iter_mut().for_each(|(_, share)| *share *= all / kept);
+    links[first..].iter_mut().for_each(|(_, bundle)| bundle.share *= all / kept);
 }
 
 fn is_one(size: usize, a: &Met, b: &Met) -> bool {
     a.member == b.member && a.place as usize / RUNS[size] == b.place as usize / RUNS[size]
 }
 
-/// Links the parts of a run that was met, so far as it may not stand for them; then the share of all others. A run of
+/// Links the parts of a run that was met, so far as it may not stand for them; then the rays of all others. A run of
 /// which the rays met less than half of the parts stands for none: the others may be the far side of a wall, and all
 /// that is lit there would shine through it.
-fn join(size: usize, met: &[Met], runs: &Runs, links: &mut Vec<(u32, f32)>) -> Option<f32> {
+fn join(size: usize, met: &[Met], runs: &Runs, links: &mut Vec<(u32, Bundle)>) -> Option<Bundle> {
     if size == 0 {
-        return Some(met.iter().map(|met| met.share).sum());
+        return Some(Bundle::of(met.iter().map(|met| Bundle { share: met.share, toward: met.share * met.toward })));
     }
     let mut small = Vec::new();
     let mut met_parts = 0;
@@ -165,13 +206,13 @@ fn join(size: usize, met: &[Met], runs: &Runs, links: &mut Vec<(u32, f32)>) -> O
         met_parts += 1;
         let number = runs.of(size - 1, part);
         match join(size - 1, part, runs, links) {
-            Some(share) if share >= LEAST_SHARE => links.push((number, share)),
-            Some(share) => small.push((number, share)),
+            Some(bundle) if bundle.share >= LEAST_SHARE => links.push((number, bundle)),
+            Some(bundle) => small.push((number, bundle)),
             None => is_whole = false,
         }
     }
     if is_whole && 2 * met_parts >= runs.parts(runs.of(size, met)).len() {
-        return Some(small.into_iter().map(|(_, share)| share).sum());
+        return Some(Bundle::of(small.into_iter().map(|(_, bundle)| bundle)));
     }
     links.extend(small);
     None
@@ -207,12 +248,12 @@ mod tests {
                     3..13 => (0, 128 + rng.u32(0..64)),
                     _ => (0, 256 + rng.u32(0..744)),
                 };
-                Met { member, place, share: 1.0 / 700.0, bright: false }
+                Met { member, place, toward: Vec3::X, share: 1.0 / 700.0, apart: false }
             })
             .collect();
         let links = links(met, &runs);
-        let share = |link: &u32| f64::from(unpack(*link).1);
-        let run = |link: &u32| unpack(*link).0;
+        let share = |link: &Link| f64::from(unpack(link.packed).1);
+        let run = |link: &Link| unpack(link.packed).0;
         assert!((links.iter().map(share).sum::<f64>() - 600.0 / 700.0).abs() < 1e-3);
         let of = |wanted: usize| links.iter().filter(|link| run(link) == wanted).map(share).sum::<f64>();
         assert!((of(143 + 1) - 60.0 / 700.0).abs() < 1e-3, "the smallest run");
@@ -235,12 +276,13 @@ mod tests {
     #[test]
     fn bright_fronts_are_linked_however_small_they_are() {
         let runs = Runs::new([16_000, 80]);
-        let dim = (0..250).map(|i| Met { member: 0, place: 64 * i, share: 1e-3, bright: false });
-        let bright = (0..10).map(|i| Met { member: 1, place: 8 * i, share: 1e-6, bright: true });
+        let dim = (0..250).map(|i| Met { member: 0, place: 64 * i, toward: Vec3::X, share: 1e-3, apart: false });
+        let bright = (0..10).map(|i| Met { member: 1, place: 8 * i, toward: Vec3::X, share: 1e-6, apart: true });
         let links = links(dim.chain(bright).collect(), &runs);
         let first_bright = runs.of_size(0).find(|(_, (member, ..))| *member == 1).unwrap().0 as usize;
-        let shares =
-            |wanted: bool| links.iter().map(|link| unpack(*link)).filter(move |l| (l.0 >= first_bright) == wanted);
+        let shares = |wanted: bool| {
+            links.iter().map(|link| unpack(link.packed)).filter(move |l| (l.0 >= first_bright) == wanted)
+        };
         assert_eq!((links.len(), shares(true).count()), (MOST_LINKS, 10));
         let [dim, bright] = [false, true].map(|wanted| shares(wanted).map(|(_, share)| share).sum::<f32>());
         assert!((dim - 0.25).abs() < 1e-3 && (bright - 1e-5).abs() < 1e-7, "{dim} {bright}");
@@ -251,9 +293,14 @@ mod tests {
     fn a_run_of_which_less_than_half_is_seen_stands_for_nothing() {
         let runs = Runs::new([512]);
         let met = |places: u32| {
-            links((0..places).map(|i| Met { member: 0, place: 8 * i, share: 1e-3, bright: false }).collect(), &runs)
+            links(
+                (0..places)
+                    .map(|i| Met { member: 0, place: 8 * i, toward: Vec3::X, share: 1e-3, apart: false })
+                    .collect(),
+                &runs,
+            )
         };
-        let largest = |links: Vec<u32>| links.iter().map(|link| unpack(*link).0).max();
+        let largest = |links: Vec<Link>| links.iter().map(|link| unpack(link.packed).0).max();
         assert_eq!(largest(met(3)), Some(2));
         assert_eq!(met(3).len(), 3);
         // Four of eight clusters.

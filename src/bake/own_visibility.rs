@@ -14,6 +14,7 @@ use crate::field::quantity::channel_stride;
 use crate::field::self_visibility::{
     BYTES, LIMIT_RAD, NODES, encode_angle, encode_distance, frame, node_direction, octahedral,
 };
+use crate::field::silhouette::through_box;
 use crate::sh::basis::{MAX_BANDS, MAX_COEFFICIENTS, coefficient_count, values};
 use crate::sh::lobe::clamped_cosine;
 use crate::sh::rotation::Rotation;
@@ -245,10 +246,11 @@ pub struct Front {
     /// Triangle of the member's mesh, and the weights of its second and third corner there.
     pub triangle: u32,
     pub weights: [f32; 2],
-    /// In the blockers' frame.
+    /// Place and direction of the ray, in the blockers' frame.
     pub place: Vec3A,
-    /// Whether it lies in a target.
-    pub bright: bool,
+    pub toward: Vec3A,
+    /// Whether it lies in a target, or beyond a screen.
+    pub apart: bool,
     /// Share of the cosine-weighted hemisphere.
     pub share: f32,
 }
@@ -273,6 +275,8 @@ pub struct Counts<'c> {
     /// For each member whether the map has its shadows; `None` for no map.
     pub in_map: Option<&'c [bool]>,
     pub targets: &'c [Target],
+    /// Boxes in the blockers' frame, their least and largest corners, in which something moves that hides what lies beyond.
+    pub screens: &'c [[DVec3; 2]],
 }
 
 /// A sphere, in the blockers' frame, within which a lamp lights things from close by. They are so much brighter than all
@@ -311,8 +315,13 @@ impl Caster<'_> {
         let toward = self.to_blockers * local;
         let (triangle, weights) = self.blockers.place(self.origin, toward, hit);
         let place = self.origin + hit.distance * toward;
-        let bright = self.counts.targets.iter().any(|target| target.has(place));
-        Some(Front { member: hit.member, triangle, weights, place, bright, share: (weight / PI) as f32 })
+        let is_beyond = |screen: &[DVec3; 2]| {
+            let crossed = through_box(*screen, self.origin.as_dvec3(), toward.as_dvec3());
+            crossed.is_some_and(|[from, to]| to > 0.0 && from < f64::from(hit.distance))
+        };
+        let apart =
+            self.counts.targets.iter().any(|target| target.has(place)) || self.counts.screens.iter().any(is_beyond);
+        Some(Front { member: hit.member, triangle, weights, place, toward, apart, share: (weight / PI) as f32 })
     }
 
     /// Replaces the fronts within targets by those that rays meet which are aimed at them.
@@ -602,6 +611,7 @@ mod tests {
             blocks: &[true; 8],
             in_map: with_map.then_some(&[false, false, false, false, false, false, false, true]),
             targets: &[],
+            screens: &[],
         };
         let standing = Standing { rotation: DMat3::IDENTITY, radius: 1.0 };
         see(&Blockers::new(corners.map(triangle), Vec::new(), Vec::new()), &standing, &eye, 4, Rays::Many, counts)
@@ -667,7 +677,7 @@ mod tests {
             let wanted: f64 =
                 directions.iter().zip(&hits).filter(|(_, hit)| hit.is_some()).map(|(d, _)| f64::from(d.y)).sum();
             let wanted = wanted / directions.iter().map(|d| f64::from(d.y)).sum::<f64>();
-            let counts = Counts { blocks: &[true], in_map: None, targets: &[] };
+            let counts = Counts { blocks: &[true], in_map: None, targets: &[], screens: &[] };
             let found = see(&blockers, &standing, &eye, 4, Rays::Many, counts).blocked;
             mean += (found / wanted - 1.0) / PLACES as f64;
             square += (found / wanted - 1.0).powi(2) / PLACES as f64;
@@ -708,7 +718,7 @@ mod tests {
         let eye = Eye { origin: Vec3::ZERO, normal: Vec3::Y };
         let standing = Standing { rotation: DMat3::IDENTITY, radius: 1.0 };
         let see_with = |in_map: &[bool], corners: &[(u32, [Vec3; 3])]| {
-            let counts = Counts { blocks: &[true; 2], in_map: Some(in_map), targets: &[] };
+            let counts = Counts { blocks: &[true; 2], in_map: Some(in_map), targets: &[], screens: &[] };
             see(
                 &Blockers::new(corners.iter().copied().map(triangle), Vec::new(), Vec::new()),
                 &standing,

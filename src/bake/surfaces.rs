@@ -2,7 +2,7 @@
 //! whole group.
 
 use super::cluster_order::cluster_order;
-use super::links::{Met, Runs, links};
+use super::links::{Link, Met, Runs, links};
 use super::own_visibility::{Counts, Eye, Front, PATTERN, Rays, Seen, Standing, Target, see};
 use super::packet::{BlockerTriangle, Blockers, Mask};
 use super::refine::{Limits, Refined, refine};
@@ -28,7 +28,7 @@ use std::sync::{Arc, OnceLock};
 use std::time::Instant;
 
 /// Counts in every name of the cache: another number where a bake of surfaces computes something else.
-const VERSION: u32 = 28;
+const VERSION: u32 = 29;
 /// How far towards the middle of its triangles a vertex is seen from, as a share of the way: the light of a crease is
 /// that just inside each face. Where meshes are left as they are, so are the places from which they are seen.
 const NUDGE: f32 = 0.02;
@@ -84,6 +84,8 @@ pub struct GroupPlan {
     refinement: Option<(u32, bool)>,
     /// Name in the cache; `None` where nothing has to be baked.
     pub key: Option<String>,
+    /// Where boxes move among the members, world, metres: least and largest corners; `None` for anywhere.
+    screens: Vec<Option<[DVec3; 2]>>,
     /// What it blocks where other things move.
     pub volume: Option<VolumePlan>,
 }
@@ -108,6 +110,8 @@ pub struct Links {
     pub counts: Vec<u8>,
     /// Those of one vertex after those of another: the number of a run of the group, and its share.
     pub packed: Vec<u32>,
+    /// Mean directions of their rays, world, where boxes move among the group; else empty.
+    pub directions: Vec<u32>,
 }
 
 impl BakedSurface {
@@ -137,6 +141,7 @@ impl SurfacePlan {
             let mask = scene.mask(entity).cloned();
             Member { mesh, placement, occludes, transparent, mask, emits: of.emits, receives: of.receives, refines }
         };
+        let screens: Vec<_> = scene.screens().into_iter().map(|entity| scene.reach(entity)).collect();
         let mut plans: Vec<GroupPlan> = Vec::new();
         // The plans of entities alone: those with equal meshes share what is baked.
         let mut alone: HashMap<([u8; 32], [bool; 3], Option<*const Texture>), usize> = HashMap::new();
@@ -157,7 +162,10 @@ impl SurfacePlan {
                 entities.iter().map(|&entity| member(entity, scene.data.entities[entity].fixed())).collect()
             };
             let bands = options.bands;
-            let plan = GroupPlan { entities, members, wanted, bands, refinement, key: None, volume: None }.named();
+            let among_screens = members.len() > 1 && scene.is_at_rest(entities[0]);
+            let screens = if among_screens { screens.clone() } else { Vec::new() };
+            let plan =
+                GroupPlan { entities, members, wanted, bands, refinement, screens, key: None, volume: None }.named();
             let moved = plan.moved_among(scene);
             let volume = moved.and_then(|(wanted, radius_m)| {
                 let name = plan.key.clone().unwrap_or_else(|| plan.name());
@@ -194,7 +202,17 @@ impl GroupPlan {
             refines: false,
         }];
         let bands = options.bands;
-        GroupPlan { entities: Vec::new(), members, wanted, bands, refinement: None, key: None, volume: None }.named()
+        let plan = GroupPlan {
+            entities: Vec::new(),
+            members,
+            wanted,
+            bands,
+            refinement: None,
+            screens: Vec::new(),
+            key: None,
+            volume: None,
+        };
+        plan.named()
     }
 
     fn named(mut self) -> Self {
@@ -221,6 +239,7 @@ impl GroupPlan {
             [self_visibility::RIM, self_visibility::LIMIT_RAD, self_visibility::DISTANCE_STEPS]
         );
         hasher.update(numbers.as_bytes());
+        hasher.update(format!("{:?}", self.screens).as_bytes());
         for member in &self.members {
             hasher.update(&member.mesh.content_hash());
             hasher.update(
@@ -368,6 +387,8 @@ pub(super) struct Group<'p> {
     boxes: Vec<[DVec3; 2]>,
     /// Where lamps light things from close by.
     targets: Vec<Target>,
+    /// The plan's screens in this frame.
+    screens: Vec<[DVec3; 2]>,
 }
 
 impl<'p> Group<'p> {
@@ -407,7 +428,9 @@ impl<'p> Group<'p> {
         let blockers = Blockers::new(triangles, masks, plan.members.iter().map(backs).collect());
         let boxes = plan.members.iter().map(|member| member.mesh.extent().map(|corner| corner.as_dvec3())).collect();
         let targets = targets(&plan.members, &spheres);
-        Group { plan, blockers, centre, radius_m, standings, spheres, boxes, targets }
+        let screens =
+            plan.screens.iter().flatten().map(|corners| corners.map(|corner| (corner - centre) / radius_m)).collect();
+        Group { plan, blockers, centre, radius_m, standings, spheres, boxes, targets, screens }
     }
 
     /// A place of the world in the group's frame.
@@ -498,7 +521,7 @@ impl GroupSpace<'_> {
         let world = self.own().placement.point((position + nudge).as_dvec3());
         let eye = Eye { origin: group.place(world).into(), normal };
         let standing = &group.standings[self.member];
-        let counts = Counts { blocks: &self.blocks, in_map, targets: &group.targets };
+        let counts = Counts { blocks: &self.blocks, in_map, targets: &group.targets, screens: &group.screens };
         let mut seen = see(&group.blockers, standing, &eye, group.plan.bands, rays, counts);
         let is_covered = self.is_covered(position, normal, nudge);
         if is_covered {
@@ -610,22 +633,26 @@ impl GroupSpace<'_> {
                 let linked = |v: &u32| {
                     let mut seen = vertex(v);
                     let fronts = std::mem::take(&mut seen.fronts).into_iter();
-                    let met = fronts.map(|Front { member, triangle, weights, bright, share, .. }| Met {
+                    let met = fronts.map(|Front { member, triangle, weights, toward, apart, share, .. }| Met {
                         member,
                         place: lit[member as usize].place(triangle, weights),
+                        toward: toward.into(),
                         share,
-                        bright,
+                        apart,
                     });
                     (seen, links(met.collect(), runs))
                 };
-                let seen: Vec<(Seen, Vec<u32>)> = cluster.par_iter().with_max_len(8).map(linked).collect();
+                let seen: Vec<(Seen, Vec<Link>)> = cluster.par_iter().with_max_len(8).map(linked).collect();
                 (near, seen)
             };
-            let found: Vec<(Vec<u32>, Vec<(Seen, Vec<u32>)>)> = batch.par_iter().map(look).collect();
+            let found: Vec<(Vec<u32>, Vec<(Seen, Vec<Link>)>)> = batch.par_iter().map(look).collect();
             for (cluster, (members, seen)) in batch.iter().zip(found) {
                 for (&v, (seen, links)) in cluster.iter().zip(seen) {
                     linked.counts.push(links.len() as u8);
-                    linked.packed.extend(links);
+                    linked.packed.extend(links.iter().map(|link| link.packed));
+                    if !plan.screens.is_empty() {
+                        linked.directions.extend(links.iter().map(|link| link.direction));
+                    }
                     any_blocked |= seen.blocked > 0.0;
                     transfer[v as usize * stride..][..stride].copy_from_slice(&seen.transfer);
                     if has_maps {
@@ -790,6 +817,7 @@ impl GroupPlan {
             if let Some(links) = links {
                 payload.extend_from_slice(&links.counts);
                 payload.extend_from_slice(bytemuck::cast_slice(&links.packed));
+                payload.extend_from_slice(bytemuck::cast_slice(&links.directions));
             }
             stored.push(StoredSurface {
                 vertices: mesh.positions.len(),
@@ -860,8 +888,10 @@ impl GroupPlan {
                 links => {
                     let counts = take(stored.vertices)?.to_vec();
                     let packed: Vec<u32> = vectors(&mut take, links)?;
+                    let directions = if self.screens.is_empty() { 0 } else { links };
+                    let directions: Vec<u32> = vectors(&mut take, directions)?;
                     (counts.iter().map(|count| usize::from(*count)).sum::<usize>() == links).then_some(())?;
-                    Some(Arc::new(Links { counts, packed }))
+                    Some(Arc::new(Links { counts, packed, directions }))
                 }
             };
             let mut near = Vec::new();

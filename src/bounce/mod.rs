@@ -9,6 +9,7 @@
 //! reflect. A lamp in spherical harmonics inside a closed mesh lights nothing of it, as the mesh's transfer ends where its
 //! own far side blocks; a sharp one does.
 
+pub mod boxes;
 pub mod movers;
 mod relaxation;
 pub(crate) mod twin;
@@ -17,6 +18,7 @@ use crate::asset::Mesh;
 use crate::bake::links::{self, RUN_BITS, RUNS, Runs};
 use crate::bake::surfaces::Links;
 use crate::error::Result;
+use crate::field::cuboid::Cuboid;
 use crate::gpu::{Access, Bind, Buffer, BufferKind, Commands, ComputePipeline, Device, TexelView};
 use crate::layout::{CLUSTER_VERTICES, QUAD_FORMAT};
 use crate::lists::far::{FarRun, FarRuns};
@@ -76,6 +78,8 @@ pub struct Linked {
     ranges: Vec<[u32; 2]>,
     /// Numbers of runs below their shares.
     links: Vec<u32>,
+    /// Mean directions of their rays, where boxes hide any.
+    directions: Vec<u32>,
     /// All runs, of which those that rest are seen by what moves.
     far: FarRuns,
     surfaces: Surfaces,
@@ -125,7 +129,8 @@ impl Linked {
             return None;
         }
         // No buffer is empty.
-        linked.links.extend(linked.links.is_empty().then_some(0));
+        linked.links.resize(linked.links.len().max(1), 0);
+        linked.directions.resize(linked.links.len(), 0);
         Some(linked)
     }
 
@@ -186,6 +191,9 @@ impl Linked {
             from += u32::from(count);
         }
         self.links.extend(links.packed.iter().map(|link| link + base));
+        self.directions.extend(&links.directions);
+        // What moves itself hides nothing of its own.
+        self.directions.resize(self.links.len(), 0);
     }
 }
 
@@ -247,6 +255,10 @@ pub struct LinkedEntity<'e> {
     pub radius_m: f64,
     /// Whether others see it by its occlusion field.
     pub reflects: bool,
+    /// Its shape, if it is a box.
+    pub cuboid: Option<Cuboid>,
+    /// Whether it is one of the scene's screens, which hide links.
+    pub is_screen: bool,
     /// Whether it never moves, and where it stands then.
     pub rests: bool,
     pub placement: Placement,
@@ -318,12 +330,23 @@ impl Bounce {
         let run_light = Buffer::new(device, "light of runs", BufferKind::Device, 16 * u64::from(run_count))?;
         let texels = merge.reads_texels() && linked.fits_texels(device);
         let meets = linked.meets();
-        let Linked { surfaces, far, ranges, .. } = linked;
+        let Linked { surfaces, far, ranges, links, directions, .. } = linked;
         let places: Vec<[f32; 4]> = far.runs.iter().flat_map(FarRun::quads).collect();
-        let views_hold = TexelView::fits(device, vk::Format::R32_UINT, 4 * MOST_ENTRIES)
+        let views_hold = texels
+            && TexelView::fits(device, vk::Format::R32_UINT, 4 * MOST_ENTRIES)
             && self_cells.is_none_or(|cells| TexelView::fits(device, vk::Format::R32G32_UINT, cells.size_bytes));
         let merge = MergePermutation { variant: merge.variant.restricted(views_hold, true), ..merge };
-        let movers = || Movers::new(device, library, (surfaces, far), merge, self_cells.is_some(), ranges.len());
+        let movers = || {
+            Movers::new(
+                device,
+                library,
+                (surfaces, far),
+                merge,
+                self_cells.is_some(),
+                ranges.len(),
+                [&links, &directions],
+            )
+        };
         let [means, bounce] = pipelines(device, library, texels, soft, meets)?;
         Ok(Bounce {
             means,
@@ -333,7 +356,7 @@ impl Bounce {
             blocks: Buffer::with_data(device, "runs", &linked.blocks)?,
             areas: Buffer::with_data(device, "areas of vertices", &linked.areas)?,
             ranges: Buffer::with_data(device, "ranges of links", &ranges)?,
-            links: Buffer::with_data(device, "links", &linked.links)?,
+            links: Buffer::with_data(device, "links", &links)?,
             run_light,
             run_places: Buffer::with_data(device, "places of runs", &places)?,
             steps: Steps::exactly(1, meets),
@@ -371,8 +394,14 @@ impl Bounce {
 
     /// What every vertex sees along its links, for reflections.
     pub fn linked_light(&self) -> LinkedLight<'_> {
-        let Bounce { ranges, links, run_light, run_places, .. } = self;
-        LinkedLight { ranges, links, run_light, run_places }
+        let Bounce { ranges, run_light, run_places, .. } = self;
+        LinkedLight { ranges, links: self.shown_links(), run_light, run_places }
+    }
+
+    /// The links of the last frame.
+    fn shown_links(&self) -> &Buffer {
+        let boxes = self.movers.as_ref().and_then(|movers| movers.boxes.as_ref());
+        boxes.map_or(&self.links, |boxes| &boxes.links)
     }
 
     /// How what it reads of the merge is to be bound, if it reads any.
@@ -387,6 +416,10 @@ impl Bounce {
         let words = vk::Format::R32_UINT;
         let vertex_count = self.vertex_count;
         let count = steps.count();
+        let met = self.movers.as_ref().zip(work.met.as_ref());
+        if let Some((movers, (inputs, _))) = met {
+            movers.hide_links(commands, inputs, &LinkedLight { links: &self.links, ..self.linked_light() })?;
+        }
         for step in 0..count {
             let from = if step == 0 { light.direct } else { light.radiosity };
             let resources = [
@@ -398,7 +431,6 @@ impl Bounce {
             ];
             commands.dispatch(&self.means, &resources, &(), [CLUSTER_VERTICES * self.block_count, 1, 1])?;
             commands.computed();
-            let met = self.movers.as_ref().zip(work.met.as_ref());
             if let Some((movers, (inputs, self_cells))) = met.filter(|_| step == steps.alone) {
                 let of_runs = [&self.run_places, &self.run_light];
                 movers.record(commands, inputs, *self_cells, of_runs, count > 1)?;
@@ -407,7 +439,7 @@ impl Bounce {
             let mut resources = vec![
                 Bind::read(self.texels, entities, quads)?,
                 Bind::read(self.texels, &self.ranges, vk::Format::R32G32_UINT)?,
-                Bind::read(self.texels, &self.links, vk::Format::R32_UINT)?,
+                Bind::read(self.texels, self.shown_links(), words)?,
                 Bind::read(self.texels, &self.run_light, quads)?,
                 Bind::read(self.texels, light.direct, quads)?,
                 Bind::Buffer(light.radiosity),

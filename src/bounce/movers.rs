@@ -5,13 +5,15 @@
 //! that comes from there instead is the mean of those surfaces of the thing that face the vertex. The light that leaves
 //! it and its area, both by direction, are nine SH coefficients each, the light of its runs of vertices times a cosine
 //! lobe; their quotient towards the vertex is that mean. (Means of six sides were too bright below what is lit from
-//! above.) How much of it the vertex sees past its own group say its map of self-visibility, or else its transfer.
+//! above.) Of a box it is that of those faces that are seen from the vertex. How much of it the vertex sees past its own group say its map of self-visibility, or else its transfer.
 //!
 //! What moves sees all that rests as flat discs with nothing between: a cut of a tree of runs ([`crate::lists::far`]).
 
-use super::LinkedEntity;
+use super::boxes::Boxes;
+use super::{LinkedEntity, LinkedLight};
 use crate::bake::links::{self, RUNS, Runs};
 use crate::error::Result;
+use crate::field::cuboid::Cuboid;
 use crate::field::self_visibility;
 use crate::gpu::{Bind, Buffer, Commands, ComputePipeline, Device, Upload};
 use crate::layout::CLUSTER_VERTICES;
@@ -36,12 +38,20 @@ pub(super) const OVER: f64 = 0.8;
 /// Width of the smoothing of cosines, in radii of the disc: what makes it right far above the disc's middle.
 pub(super) const SMOOTH: f64 = 4.0 / (3.0 * PI);
 
+/// Share of a face's view that counts where it is seen from its edge or from within: a mean of all faces where none is
+/// seen; and the square of the distance from its middle, in r, that is added.
+pub(super) const UNFACED: f64 = 1e-3;
+
 /// The surfaces of those entities of a scene that reflect.
 #[derive(Default)]
 pub(super) struct Surfaces {
     /// Whether each entity reflects by its field.
     pub reflects: Vec<bool>,
     pub rests: Vec<bool>,
+    /// Shapes of those that are boxes and move.
+    pub cuboids: Vec<Option<Cuboid>>,
+    /// Those that hide links.
+    boxes: Vec<usize>,
     pub movers: Vec<Mover>,
     pub runs: Vec<MoverRun>,
 }
@@ -66,8 +76,8 @@ pub(super) struct MoverRun {
     pub middle: [f32; 4],
     /// Mean normal.
     pub normal: [f32; 4],
-    /// Its area by direction, as seen from there, in SH: m^2 of the mesh.
-    pub lobe: [f32; 12],
+    /// Its area by direction, as seen from there, in SH, or by the six faces of a box: m^2 of the mesh.
+    pub areas: [f32; 12],
 }
 
 impl Surfaces {
@@ -76,6 +86,8 @@ impl Surfaces {
         Surfaces {
             reflects: entities.iter().map(|entity| entity.reflects).collect(),
             rests: entities.iter().map(|entity| entity.rests).collect(),
+            cuboids: entities.iter().map(|entity| entity.cuboid.filter(|_| !entity.rests)).collect(),
+            boxes: (0..entities.len()).filter(|&index| entities[index].is_screen && entities[index].reflects).collect(),
             ..Surfaces::default()
         }
     }
@@ -95,13 +107,17 @@ impl Surfaces {
                 let mut area = 0.0;
                 let mut middle = DVec3::ZERO;
                 let mut normal = DVec3::ZERO;
-                let mut lobe = [0.0; 12];
+                let mut by_direction = [0.0; 12];
                 for v in entity.order[first..first + vertices].iter().map(|&v| v as usize) {
                     let of_vertex = entity.mesh.normals[v].as_dvec3();
                     area += areas[v];
                     middle += areas[v] * (entity.mesh.positions[v].as_dvec3() - entity.centre_m);
                     normal += areas[v] * of_vertex;
-                    for (sum, c) in lobe.iter_mut().zip(clamped_cosine(3, of_vertex)) {
+                    if let Some(cuboid) = entity.cuboid.filter(|_| !entity.rests) {
+                        by_direction[cuboid.face(of_vertex)] += areas[v];
+                        continue;
+                    }
+                    for (sum, c) in by_direction.iter_mut().zip(clamped_cosine(3, of_vertex)) {
                         *sum += areas[v] * c;
                     }
                 }
@@ -109,7 +125,7 @@ impl Surfaces {
                 MoverRun {
                     middle: middle.extend(f32::from_bits(base + number)).to_array(),
                     normal: normal.normalize_or_zero().as_vec3().extend(0.0).to_array(),
-                    lobe: lobe.map(|c| c as f32),
+                    areas: by_direction.map(|c| c as f32),
                 }
             };
             let run_first = self.runs.len() as u32;
@@ -129,6 +145,10 @@ pub(super) struct Movers {
     permutation: MergePermutation,
     pub surfaces: Surfaces,
     pub far: FarRuns,
+    /// Those that hide links.
+    pub boxes: Option<Boxes>,
+    /// Of every entity, three quads: halves of a box's edges.
+    edges: Buffer,
     movers_data: Upload,
     runs: Buffer,
     /// Of every entity, nine quads.
@@ -166,6 +186,7 @@ impl Movers {
         permutation: MergePermutation,
         self_shadows: bool,
         vertices: usize,
+        links: [&[u32]; 2],
     ) -> Result<Self> {
         let [outgoing, distant, movers] = pipelines(device, library, &permutation, self_shadows)?;
         // No buffer is empty.
@@ -173,6 +194,8 @@ impl Movers {
             [] => Buffer::zeros(device, name, 16),
             quads => Buffer::with_data(device, name, quads),
         };
+        let of_entity = |cuboid: &Option<Cuboid>| cuboid.map_or([[0.0; 4]; 3], |cuboid| cuboid.quads());
+        let edges: Vec<[f32; 4]> = surfaces.cuboids.iter().flat_map(of_entity).collect();
         Ok(Movers {
             outgoing,
             distant,
@@ -187,6 +210,8 @@ impl Movers {
             pairs: Upload::new(device, "distant movers", 64)?,
             pair_count: 0,
             spheres: Upload::on_device(device, "distant movers as spheres", 64)?,
+            boxes: Boxes::new(device, library, &surfaces.boxes, links, &permutation)?,
+            edges: buffer("boxes that move", &edges)?,
             permutation,
             surfaces,
             far,
@@ -195,9 +220,14 @@ impl Movers {
 
     /// Lists what each cluster meets at the lists' time.
     pub fn prepare(&mut self, lists: &ClusterLists) -> Result<()> {
-        let Surfaces { reflects, rests, movers, .. } = &mut self.surfaces;
-        let of =
-            Reflectors { movers: movers.iter().map(|mover| mover.entity as usize), reflects, rests, far: &self.far };
+        let Surfaces { reflects, rests, boxes, movers, .. } = &mut self.surfaces;
+        let of = Reflectors {
+            movers: movers.iter().map(|mover| mover.entity as usize),
+            reflects,
+            rests,
+            boxes,
+            far: &self.far,
+        };
         let found = lists.reflectors(&of);
         for (mover, [first, count]) in movers.iter_mut().zip(found.cuts) {
             mover.far_first = first;
@@ -210,6 +240,19 @@ impl Movers {
         self.pair_count = found.pairs.len() as u32;
         self.pairs.write(&found.pairs)?;
         self.spheres.reserve(32 * found.pairs.len() as u64)
+    }
+
+    /// Writes the links of the frame, where boxes hide any.
+    pub fn hide_links<'r>(
+        &'r self,
+        commands: &mut Commands<'r>,
+        inputs: &MergeInputs<'r>,
+        baked: &LinkedLight<'r>,
+    ) -> Result<()> {
+        let Some(boxes) = &self.boxes else { return Ok(()) };
+        boxes.record(commands, inputs, (&self.clusters, self.cluster_count), baked, &self.edges)?;
+        commands.computed();
+        Ok(())
     }
 
     /// Which variant its inputs are to be read by.
@@ -249,6 +292,7 @@ impl Movers {
                 Bind::read(texels, &self.clusters, vk::Format::R32G32_UINT)?,
                 inputs.fields.bind(),
                 Bind::read(texels, &self.light, quads)?,
+                Bind::read(texels, &self.edges, quads)?,
                 Bind::read(texels, &self.pairs, vk::Format::R32G32_UINT)?,
                 Bind::Buffer(&self.spheres),
             ];
@@ -261,6 +305,7 @@ impl Movers {
             inputs.transfers.bind(),
             inputs.vertices.bind(),
             Bind::read(texels, &self.light, quads)?,
+            Bind::read(texels, &self.edges, quads)?,
             Bind::Buffer(&self.incoming),
             self_cells.map_or(Ok(Bind::None), |cells| Bind::read(texels, cells, vk::Format::R32G32_UINT))?,
             Bind::read(texels, &self.spheres, quads)?,
@@ -287,5 +332,5 @@ pub fn movers_row(permutation: &MergePermutation, self_shadows: bool) -> ShaderP
 }
 
 fn far_row(permutation: &MergePermutation, file: &'static str) -> ShaderPermutation {
-    links::macros(permutation.row_of(file)).number("OVER", OVER).number("SMOOTH", SMOOTH)
+    links::macros(permutation.row_of(file)).number("OVER", OVER).number("SMOOTH", SMOOTH).number("UNFACED", UNFACED)
 }

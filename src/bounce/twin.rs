@@ -1,10 +1,12 @@
 //! The CPU twin of the passes in f64, from the same links, lists and fields.
 
-use super::movers::{Movers, OUTGOING, OVER, SMOOTH};
+use super::boxes::{LEAST_COSINE, NARROWED};
+use super::movers::{Movers, OUTGOING, OVER, SMOOTH, UNFACED};
 use super::relaxation::MOST_STEPS;
 use super::{Bounce, RunBlock, Steps};
-use crate::bake::links::{RUNS, unpack};
+use crate::bake::links::{RUNS, pack, unpack, unpack_direction};
 use crate::error::Result;
+use crate::field::cuboid::Cuboid;
 use crate::field::self_visibility;
 use crate::layout::Cluster;
 use crate::lists::incremental::CUT_HEADER;
@@ -43,7 +45,10 @@ pub struct TwinVertex<'t> {
 impl Bounce {
     /// Light of every place after these steps.
     pub fn twin(&self, input: &TwinInput<'_>, steps: &Steps) -> Result<Vec<DVec3>> {
-        let host = self.download()?;
+        let mut host = self.download()?;
+        if let Some(movers) = &self.movers {
+            host.links = movers.hidden_links(input, &host, &self.places()?)?;
+        }
         let mut light = input.direct.to_vec();
         let mut incoming = vec![(DVec3::ZERO, 0.0); light.len()];
         for step in 0..steps.count() {
@@ -72,7 +77,8 @@ impl Bounce {
     pub fn links_of(&self, vertices: Range<usize>) -> Result<Vec<Vec<SeenLink>>> {
         let host = self.download()?;
         let light: Vec<[f32; 4]> = self.run_light.download(self.run_count as usize)?;
-        let places: Vec<[[f32; 4]; 2]> = self.run_places.download(self.run_count as usize)?;
+        let places = self.places()?;
+        let links: Vec<u32> = self.shown_links().download(host.links.len())?;
         let seen = |link: &u32| {
             let (run, share) = unpack(*link);
             let [x, y, z, rests] = places[run][0].map(f64::from);
@@ -82,9 +88,13 @@ impl Bounce {
                 light: DVec3::from_slice(&light[run].map(f64::from)),
             }
         };
-        let of_vertex =
-            |(first, _, count): (usize, usize, usize)| host.links[first..][..count].iter().map(seen).collect();
+        let of_vertex = |(first, _, count): (usize, usize, usize)| links[first..][..count].iter().map(seen).collect();
         Ok(host.vertices().skip(vertices.start).take(vertices.len()).map(of_vertex).collect())
+    }
+
+    /// Places of all runs, as [`crate::lists::far::FarRun::quads`] has them.
+    fn places(&self) -> Result<Vec<[[f32; 4]; 2]>> {
+        self.run_places.download(self.run_count as usize)
     }
 
     /// What the passes read of links, in host memory.
@@ -157,7 +167,12 @@ impl HostLinks {
 
     /// First link, entity and number of links of every vertex.
     pub fn vertices(&self) -> impl Iterator<Item = (usize, usize, usize)> {
-        self.ranges.iter().map(|[first, packed]| (*first as usize, (packed >> 8) as usize, (packed & 255) as usize))
+        (0..self.ranges.len()).map(|place| self.vertex(place))
+    }
+
+    fn vertex(&self, place: usize) -> (usize, usize, usize) {
+        let [first, packed] = self.ranges[place];
+        (first as usize, (packed >> 8) as usize, (packed & 255) as usize)
     }
 
     /// Light along links, as a share of the hemisphere times radiosity.
@@ -168,6 +183,50 @@ impl HostLinks {
 }
 
 impl Movers {
+    /// All links, as boxes leave them.
+    fn hidden_links(&self, input: &TwinInput<'_>, host: &HostLinks, places: &[[[f32; 4]; 2]]) -> Result<Vec<u32>> {
+        let mut links = host.links.clone();
+        let Some(boxes) = &self.boxes else { return Ok(links) };
+        let clusters: Vec<Cluster> = self.clusters.download(self.cluster_count as usize)?;
+        let directions: Vec<u32> = boxes.directions.download(links.len())?;
+        let left = |position: DVec3, normal: DVec3, link: u32, direction: u32| {
+            let (run, share) = unpack(link);
+            let [x, y, z, rests] = places[run][0].map(f64::from);
+            if rests == 0.0 {
+                return link;
+            }
+            let distance = DVec3::new(x, y, z).distance(position);
+            let toward = unpack_direction(direction).as_dvec3().normalize();
+            let tangent = NARROWED * (f64::from(share) / normal.dot(toward).max(LEAST_COSINE)).sqrt();
+            let visible = |entity: &u32| {
+                let object = &input.objects[*entity as usize];
+                let cuboid = self.surfaces.cuboids[*entity as usize].expect("a box");
+                let to_object = object.rotation.inverse();
+                let point = to_object * (position - object.centre) / object.radius_m;
+                let along = to_object * toward;
+                1.0 - object.opacity * cuboid.blocked(point, along, distance / object.radius_m, tangent)
+            };
+            let share = f64::from(share) * boxes.push.entities().iter().map(visible).product::<f64>();
+            pack(share as f32, run as u32).unwrap_or(run as u32)
+        };
+        let of_cluster = |cluster: &Cluster| {
+            let of_vertex = |v: usize| {
+                let TwinVertex { position, normal, .. } = (input.vertex)(cluster, v);
+                let normal = input.objects[cluster.receiver as usize].rotation * normal;
+                let (first, _, count) = host.vertex(cluster.radiosity_first as usize + v);
+                let links = host.links[first..][..count].iter().zip(&directions[first..]);
+                let left = links.map(|(link, direction)| left(position, normal, *link, *direction));
+                (first, left.collect::<Vec<_>>())
+            };
+            (0..cluster.vertex_count as usize).map(of_vertex).collect::<Vec<_>>()
+        };
+        let found: Vec<Vec<(usize, Vec<u32>)>> = clusters.par_iter().map(of_cluster).collect();
+        for (first, left) in found.into_iter().flatten() {
+            links[first..][..left.len()].copy_from_slice(&left);
+        }
+        Ok(links)
+    }
+
     /// What every vertex receives from other groups, and the share of its view that they take.
     fn twin(
         &self,
@@ -192,7 +251,7 @@ impl Movers {
                     let met = within_hemisphere(self.near_light(runs, of_runs, place, object.rotation * normal));
                     light += PI * DVec3::from(object.albedo_over_pi) * met;
                 }
-                for ((sum, area), weight) in outgoing[mover.entity as usize].iter_mut().zip(run.lobe) {
+                for ((sum, area), weight) in outgoing[mover.entity as usize].iter_mut().zip(run.areas) {
                     *sum += f64::from(weight) * light;
                     *area += f64::from(weight);
                 }
@@ -201,6 +260,7 @@ impl Movers {
         let of_cluster = |cluster: &Cluster| {
             let receiver = &input.objects[cluster.receiver as usize];
             let (header, list) = some(cluster.entry_first, cluster.entry_count).split_at(CUT_HEADER);
+            let [near_boxes, distant_boxes] = [header[7], header[8]].map(|count| count as usize);
             let (near, list) = list.split_at(header[3] as usize);
             let (far, list) = list.split_at(header[4] as usize);
             let middle = receiver.centre + Vec3::from(std::array::from_fn(|i| f32::from_bits(header[i]))).as_dvec3();
@@ -218,15 +278,17 @@ impl Movers {
                 let at_rest = within_hemisphere((near + seen_far.max(DVec3::ZERO), near_share + far_share.max(0.0)));
                 let mut sum = DVec3::ZERO;
                 let mut taken = 0.0;
-                for sphere in &spheres {
+                let mut hidden = 0.0;
+                for (place, sphere) in spheres.iter().enumerate() {
                     let cone = Cone::new(sphere.centre, sphere.radius_m, vertex.position);
                     let sine = (sphere.radius_m / cone.distance).min(1.0);
                     let share = sphere.weight * sphere_share(sine, normal.dot(cone.toward));
                     let share = share * own_visible(&vertex, receiver, &cone, sphere.radius_m);
                     sum += share * sphere.light;
                     taken += share;
+                    hidden += if place < distant_boxes { share } else { 0.0 };
                 }
-                for &packed in list {
+                for (place, &packed) in list.iter().enumerate() {
                     let (entity, weight) = unpack(packed);
                     let object = &input.objects[entity];
                     let cone = Cone::new(object.centre, object.radius_m, vertex.position);
@@ -240,11 +302,13 @@ impl Movers {
                     let own = own_visible(&vertex, receiver, &cone, object.radius_m);
                     let share = share * cone.above_horizon(normal, input.skip) * object.opacity / PI * own;
                     let share = f64::from(weight) * share.max(0.0);
-                    sum += share * seen(&outgoing[entity], seen_from(from, field.header.bands, &blocked));
+                    let direction = seen_from(from, field.header.bands, &blocked);
+                    sum += share * self.seen(entity, &outgoing[entity], from, direction);
                     taken += share;
+                    hidden += if place < near_boxes { share } else { 0.0 };
                 }
                 let scale = 1.0 / f64::max(taken, 1.0);
-                (at_rest * (1.0 - taken * scale) + sum * scale, taken * scale)
+                (at_rest * (1.0 - taken * scale) + sum * scale, (taken - hidden) * scale)
             };
             (0..cluster.vertex_count as usize).map(of_vertex).collect::<Vec<_>>()
         };
@@ -275,8 +339,16 @@ impl Movers {
         Sphere {
             centre: middle - to.length() * (object.rotation * direction),
             radius_m: (1.0 - cosine * cosine).sqrt() * to.length(),
-            light: seen(&outgoing[entity], direction),
+            light: self.seen(entity, &outgoing[entity], from, direction),
             weight: object.opacity * f64::from(weight),
+        }
+    }
+
+    /// Mean radiosity of those surfaces of a mover that are seen from a place in its frame, along a direction.
+    fn seen(&self, entity: usize, outgoing: &[(DVec3, f64); OUTGOING], from: DVec3, direction: DVec3) -> DVec3 {
+        match &self.surfaces.cuboids[entity] {
+            Some(cuboid) => seen_faces(cuboid, outgoing, from),
+            None => seen(outgoing, direction),
         }
     }
 
@@ -371,6 +443,21 @@ fn own_visible(vertex: &TwinVertex<'_>, receiver: &MergeObject<'_>, cone: &Cone,
 fn seen_from(from: DVec3, bands: usize, blocked: &[f64; MAX_COEFFICIENTS]) -> DVec3 {
     let middle = if bands == 1 { from } else { DVec3::new(blocked[3], blocked[1], -blocked[2]) };
     middle.normalize_or_zero()
+}
+
+/// Mean radiosity of the faces of a box that are seen from a place in its frame, in r.
+fn seen_faces(cuboid: &Cuboid, faces: &[(DVec3, f64); OUTGOING], from: DVec3) -> DVec3 {
+    let mut light = DVec3::ZERO;
+    let mut area = 0.0;
+    for (face, (of_light, of_area)) in faces[..6].iter().enumerate() {
+        let edge = cuboid.half_edges[face / 2] * if face % 2 == 0 { 1.0 } else { -1.0 };
+        let to = from - edge;
+        let height = to.dot(edge.normalize()).max(0.0);
+        let weight = (height + UNFACED) * (to.length_squared() + UNFACED).powf(-1.5);
+        light += weight * *of_light;
+        area += weight * of_area;
+    }
+    light / f64::max(area, 1e-20)
 }
 
 /// Mean radiosity of those surfaces of a mover that are seen along a direction, which comes from the mover in its frame.

@@ -38,6 +38,15 @@ impl Cuboid {
         self.half_edges.map(|edge| edge.extend(0.0).as_vec4().to_array())
     }
 
+    /// The face that looks most in a direction: that at the end of edge `face / 2`, or at its beginning if it is odd.
+    pub fn face(&self, direction: DVec3) -> usize {
+        let looks = |face: &usize| {
+            let edge = self.half_edges[face / 2].normalize().dot(direction);
+            if face % 2 == 0 { edge } else { -edge }
+        };
+        (0..6).max_by(|a, b| looks(a).total_cmp(&looks(b))).expect("six faces")
+    }
+
     /// The ray from a point along a unit vector.
     pub fn ray(&self, point: DVec3, along: DVec3) -> CuboidRay {
         let edges = self.half_edges;

@@ -127,6 +127,7 @@ impl Frame {
         let wanted = permutation(&options, wanted, &scene, &methods, uniform_entities(device));
         let wanted = MergePermutation { volume: buffers.volume.is_some(), ..wanted };
         let placements = scene.at(0.0);
+        let screens = scene.screens();
         let linked = |(entity, links)| LinkedEntity {
             mesh: scene.surface(entity),
             order: &buffers.surface(entity).order,
@@ -134,6 +135,8 @@ impl Frame {
             centre_m: buffers.meshes[scene.entities[entity].mesh].centre_m,
             radius_m: buffers.meshes[scene.entities[entity].mesh].radius_m,
             reflects: scene.entities[entity].occludes && buffers.shadows(&scene, entity),
+            cuboid: scene.casts_as_box(entity).then(|| scene.caster(scene.entities[entity].mesh).cuboid()).flatten(),
+            is_screen: screens.contains(&entity),
             rests: scene.is_at_rest(entity),
             placement: placements[entity],
             receives: scene.entities[entity].receives,

@@ -75,7 +75,7 @@ pub(crate) struct ClusterLists {
 }
 
 /// Words before the runs of a list of [`ClusterLists::reflectors`].
-pub(crate) const CUT_HEADER: usize = 7;
+pub(crate) const CUT_HEADER: usize = 9;
 
 /// Most pairs of a cluster and a mover that it sees from afar: 40 MB for each frame in flight, and a dispatch that every
 /// device takes.
@@ -88,6 +88,8 @@ pub(crate) struct Reflectors<'r, I> {
     pub reflects: &'r [bool],
     /// Whether it never moves.
     pub rests: &'r [bool],
+    /// Those that hide links between what rests.
+    pub boxes: &'r [usize],
     /// All that rests, as what moves sees it.
     pub far: &'r FarRuns,
 }
@@ -110,6 +112,8 @@ struct Sighted {
     cut: Cut,
     near: Vec<u32>,
     distant: Vec<u32>,
+    /// How many of either begin the list because they hide links.
+    boxes: [usize; 2],
 }
 
 /// What a frame did about its clusters.
@@ -331,8 +335,9 @@ impl ClusterLists {
 
     /// What light bounces from onto each cluster at the last update's time. A list begins with [`CUT_HEADER`] words: the
     /// middle of the cluster in the world, from its entity's centre; how many near and far runs of what rests it sees, if
-    /// it moves; its first pair and their number. The runs follow, and then entities nearby. All entries but those of the
-    /// header are below their weights.
+    /// it moves; its first pair and their number; how many entities nearby, and how many pairs, are of boxes that hide its
+    /// links. The runs follow, and then entities nearby, such boxes first. All entries but those of the header are below
+    /// their weights.
     ///
     /// The cuts of whole entities that move, of those in `of.movers`, come last.
     pub fn reflectors(&self, of: &Reflectors<'_, impl Iterator<Item = usize> + Clone + Sync>) -> Reflected {
@@ -350,17 +355,22 @@ impl ClusterLists {
             };
             let keep = |j| candidates.extend(reflects(j).then_some(j));
             scene_bounds.tree.find(|crowd| scope.leaves_dark(crowd), keep);
+            let is_box = |j: &u32| rests && of.boxes.contains(&(*j as usize));
+            candidates.sort_by_key(|j| !is_box(j));
             let of_cluster = |cluster: usize| {
                 let scope = Scope::new(scene_bounds, receiver, entity, &self.bounds[cluster], &[]);
                 let (centre, radius_m) = scope.sphere();
                 let cut = if rests { Cut::default() } else { of.far.cut(centre.as_vec3(), radius_m as f32) };
                 let middle = (centre - scene_bounds.entities[receiver].centre).as_vec3();
-                let mut sighted = Sighted { middle, cut, near: Vec::new(), distant: Vec::new() };
+                let mut sighted = Sighted { middle, cut, near: Vec::new(), distant: Vec::new(), boxes: [0, 0] };
                 for &j in candidates.iter().filter(|&&j| scope.meets(j as usize)) {
                     let bounds = &scene_bounds.entities[j as usize];
                     let distant = far::distant(bounds.centre.distance(centre), bounds.radius_m, radius_m);
                     sighted.distant.extend(far::pack(distant, j));
                     sighted.near.extend(far::pack(1.0 - distant, j));
+                    if is_box(&j) {
+                        sighted.boxes = [sighted.near.len(), sighted.distant.len()];
+                    }
                 }
                 sighted
             };
@@ -370,14 +380,14 @@ impl ClusterLists {
         let found: Vec<&Sighted> = found.iter().flatten().collect();
         let mut all = Reflected { clusters: self.deal(self.clusters.clone()), ..Reflected::default() };
         for (number, sighted) in self.deal(found).into_iter().enumerate() {
-            let Sighted { middle, cut, near, distant } = sighted;
+            let Sighted { middle, cut, near, distant, boxes: [near_boxes, distant_boxes] } = sighted;
             let entry_first = all.entries.len() as u32;
             // Where there are too many pairs, vertices look up the rest.
             let seen = distant.len().min(MOST_PAIRS - all.pairs.len());
             let (distant, rest) = distant.split_at(seen);
-            let counts = [cut.near.len(), cut.far.len(), all.pairs.len(), distant.len()].map(|count| count as u32);
+            let counts = [cut.near.len(), cut.far.len(), all.pairs.len(), seen, *near_boxes, seen.min(*distant_boxes)];
             all.entries.extend(middle.to_array().map(f32::to_bits));
-            all.entries.extend(counts);
+            all.entries.extend(counts.map(|count| count as u32));
             all.entries.extend(cut.near.iter().chain(&cut.far).chain(near).chain(rest));
             all.pairs.extend(distant.iter().map(|packed| [number as u32, *packed]));
             let entry_count = all.entries.len() as u32 - entry_first;

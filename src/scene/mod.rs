@@ -72,6 +72,9 @@ pub struct Scene {
     camera_added: bool,
 }
 
+/// Most boxes that move of which it is known which links of light between what rests they hide.
+pub(crate) const MOST_SCREENS: usize = 8;
+
 /// The properties of an entity that do not depend on time.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Entity {
@@ -397,18 +400,31 @@ impl Scene {
         self.data.entities.iter().map(|e| e.at(time_s)).chain(self.suns.iter().copied()).collect()
     }
 
-    /// The box in the world that the bounding sphere of an entity stays in as it moves, metres; `None` where it may be
-    /// put anywhere.
+    /// The box in the world that an entity stays in as it moves, metres; `None` where it may be put anywhere.
     pub(crate) fn reach(&self, entity: usize) -> Option<[DVec3; 2]> {
         const TIMES: usize = 128;
         let data = self.data.entities.get(entity).filter(|data| !data.motion.is_empty())?;
         let spans = data.motion.iter().map(Motion::span_s);
         let [from_s, to_s] = spans.fold([f64::MAX, f64::MIN], |[low, high], [from, to]| [low.min(from), high.max(to)]);
-        let sphere = self.meshes[self.entities[entity].mesh].bounding_sphere();
+        let extent = self.meshes[self.entities[entity].mesh].extent();
+        let corner = |i: usize| Vec3::new(extent[i & 1].x, extent[i >> 1 & 1].y, extent[i >> 2].z).as_dvec3();
         // Movements of several periods are at many places together.
         let place = |i: usize| from_s + 2.0 * (to_s - from_s) * i as f64 / TIMES as f64;
-        let spheres = (0..=TIMES).map(|i| data.at(place(i)).sphere(sphere));
-        around_boxes(spheres.map(|(centre, radius_m)| [centre - radius_m, centre + radius_m]))
+        let places = (0..=TIMES).map(|i| data.at(place(i)));
+        around_boxes(places.flat_map(|place| (0..8).map(move |i| [place.point(corner(i)); 2])))
+    }
+
+    /// The largest boxes that move and keep light back, at most [`MOST_SCREENS`].
+    pub(crate) fn screens(&self) -> Vec<usize> {
+        let radius_m = |entity: &usize| {
+            let radius = self.meshes[self.entities[*entity].mesh].bounding_sphere().1;
+            radius * self.data.entities[*entity].scale
+        };
+        let moves = |entity: &usize| self.casts_as_box(*entity) && !self.is_at_rest(*entity);
+        let mut screens: Vec<usize> = (0..self.data.entities.len()).filter(moves).collect();
+        screens.sort_by(|a, b| radius_m(b).total_cmp(&radius_m(a)));
+        screens.truncate(MOST_SCREENS);
+        screens
     }
 
     /// Replaces the data of an entity; its mesh stays the same.

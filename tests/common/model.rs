@@ -153,7 +153,10 @@ impl Model {
     fn with_buffer(&self, uri: Option<String>) -> String {
         let mut json = self.json.clone();
         if !self.bytes.is_empty() {
-            json["buffers"] = json!([{ "byteLength": self.bytes.len() }]);
+            if json["buffers"].is_null() {
+                json["buffers"] = json!([{}]);
+            }
+            json["buffers"][0]["byteLength"] = json!(self.bytes.len());
             if let Some(uri) = uri {
                 json["buffers"][0]["uri"] = json!(uri);
             }

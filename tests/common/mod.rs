@@ -1,5 +1,5 @@
-//! What the GPU tests share: one validated device a test binary, used by one test at a time, and helpers that read
-//! images back.
+//! What tests share: one validated device a test binary, used by one test at a time, with a cache of fields that lives as
+//! long as the binary, and helpers.
 //!
 //! With SHADOW_FIELDS_REQUIRE_DEVICE=1 a missing device, validation layer or tool fails the tests; without it they are
 //! skipped with a line on stderr.
@@ -8,16 +8,13 @@
 
 pub use shadow_fields::asset::generate;
 
-use bytemuck::Pod;
 use glam::Vec3;
 use shadow_fields::asset::Mesh;
 use shadow_fields::bake::Baker;
 use shadow_fields::bake::cache::Cache;
-use shadow_fields::bake::capture::{Capture, Slots};
-use shadow_fields::check;
 use shadow_fields::frame::{self, Frame};
 use shadow_fields::gpu::{Device, DeviceOptions, Validation};
-use shadow_fields::scene::Scene;
+use shadow_fields::scene::{Placement, Scene};
 use shadow_fields::shaders::Library;
 use std::path::{Path, PathBuf};
 use std::process::Child;
@@ -104,14 +101,36 @@ impl Gpu {
         Baker::new(&self.device, &self.library)
     }
 
-    /// A scene on the shared device, baked anew.
+    /// A scene on the shared device, its fields baked.
     pub fn frame(&self, scene: &Scene, options: frame::Options) -> Frame {
-        Frame::new(&self.baker(), &Cache::new(None), scene, options, &|_, _, _| ()).unwrap()
+        self.frame_on(&self.baker(), scene, options)
     }
 
-    /// Captures the faces of a batch and brings the atlas to the host; `C` values of `T` a texel.
-    pub fn atlas<T: Pod>(&self, capture: &Capture, eyes: &[Vec3], slots: &[Slots]) -> Vec<T> {
-        check::capture::atlas(&self.device, capture, eyes, slots).unwrap()
+    /// The same on the device of another baker, by the fields that are baked already.
+    pub fn frame_on(&self, baker: &Baker, scene: &Scene, options: frame::Options) -> Frame {
+        // Emptied first: fields of an earlier build would hide what this one bakes.
+        static FIELDS: OnceLock<PathBuf> = OnceLock::new();
+        let fields = FIELDS.get_or_init(|| {
+            let name = format!("fields-{}", env!("CARGO_CRATE_NAME"));
+            let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join(name);
+            let _ = std::fs::remove_dir_all(&folder);
+            folder
+        });
+        Frame::new(baker, &Cache::new(Some(fields)), scene, options, &|_, _, _| ()).unwrap()
+    }
+
+    /// Radiosity of every entity's vertices in turn, red, green and blue.
+    pub fn light(&self, frame: &mut Frame, placements: &[Placement]) -> Vec<Vec<[f32; 3]>> {
+        frame.render(placements, None).unwrap();
+        (0..placements.len()).map(|entity| frame.radiosity(entity).unwrap()).collect()
+    }
+
+    /// What comes of recordings without the barrier of that index.
+    pub fn without_barrier<R>(&self, index: usize, record: impl FnOnce() -> R) -> R {
+        self.device.omit_barrier(Some(index));
+        let outcome = record();
+        self.device.omit_barrier(None);
+        outcome
     }
 }
 

@@ -1,7 +1,6 @@
 //! Rooms that people build and their lamps: pictures beside rays.
 
-use super::common::{generate, relative_rms};
-use super::stage::{Stage, stage};
+use crate::common::{Gpu, generate, gpu, relative_rms};
 use glam::{DQuat, Vec2, Vec3};
 use shadow_fields::asset::Mesh;
 use shadow_fields::asset::environment::EnvironmentData;
@@ -23,12 +22,12 @@ fn turned(axis: Vec3, angle_deg: f64) -> RotationData {
 }
 
 /// Relative RMS of a scene's picture against rays through its pixels, direct light alone.
-fn picture_error(stage: &Stage, scene: &Scene) -> f64 {
+fn picture_error(gpu: &Gpu, scene: &Scene) -> f64 {
     let size = [96, 64];
     let bake = bake::Options { groups: true, vertices: 20_000, ..bake::Options::default() };
     let options = frame::Options { size, bake, bounces: Bounces::None, ..frame::Options::default() };
     let placements = scene.at(0.0);
-    let mut frame = stage.frame(scene, options);
+    let mut frame = gpu.frame(scene, options);
     frame.render(&placements, Some(f32::INFINITY)).unwrap();
     let shapes = RayMeshes::new(scene);
     let world = World::new(scene, &shapes, &placements);
@@ -42,7 +41,7 @@ fn picture_error(stage: &Stage, scene: &Scene) -> f64 {
 /// is behind the lamp hides it, as seen from a vertex or from between vertices.
 #[test]
 fn a_room_of_one_mesh_is_lit_by_its_ceiling_lamp() {
-    let Some(stage) = stage() else { return };
+    let Some(gpu) = gpu() else { return };
     let solid = generate::cuboid(Vec3::splat(2.0), 1);
     let is_front = |t: &[u32; 3]| t.iter().all(|&v| solid.normals[v as usize].z > 0.5);
     let open = solid.triangles.iter().filter(|triangle| !is_front(triangle));
@@ -66,14 +65,14 @@ fn a_room_of_one_mesh_is_lit_by_its_ceiling_lamp() {
             emission: Vec3::splat(10.0),
             ..EntityData::of_mesh("lamp")
         });
-    let error = picture_error(&stage, &scene.build().unwrap());
+    let error = picture_error(&gpu, &scene.build().unwrap());
     assert!(error < 0.06, "{error}");
 }
 
 /// A bulb within a shade lights what lies below, and nothing beside it.
 #[test]
 fn no_light_comes_through_a_lamp_shade() {
-    let Some(stage) = stage() else { return };
+    let Some(gpu) = gpu() else { return };
     // A ring that is open above and below, and a dome with the bulb up to 0.4 radii above the middle of its sphere: the
     // highest lies before its rim as seen from above, and shone through its top.
     let ring = [[0.28, -0.15], [0.16, 0.15], [0.15, 0.15], [0.27, -0.15]];
@@ -81,7 +80,7 @@ fn no_light_comes_through_a_lamp_shade() {
     let dome_heights = [(0.5, 0.03), (0.54, 0.03), (0.58, 0.03), (0.64, 0.15)];
     let in_dome = dome_heights.map(|(height, most)| (&dome[..], height, most));
     for (profile, height, most) in [(&ring[..], 0.62, 0.03)].into_iter().chain(in_dome) {
-        let error = picture_error(&stage, &under_a_shade(profile, height));
+        let error = picture_error(&gpu, &under_a_shade(profile, height));
         assert!(error < most, "{height}: {error}");
     }
 }
@@ -89,7 +88,7 @@ fn no_light_comes_through_a_lamp_shade() {
 /// A globe of glass around a bulb takes its share once of all that leaves it, whether ball or box.
 #[test]
 fn glass_around_a_bulb_takes_its_share() {
-    let Some(stage) = stage() else { return };
+    let Some(gpu) = gpu() else { return };
     let ball = generate::sphere(0.18, 3);
     let lantern = generate::cuboid(Vec3::splat(0.3), 1);
     for (name, glass) in [("ball", ball), ("lantern", lantern)] {
@@ -107,7 +106,7 @@ fn glass_around_a_bulb_takes_its_share() {
                 emission: Vec3::splat(10.0),
                 ..EntityData::of_mesh("bulb")
             });
-        let error = picture_error(&stage, &scene.build().unwrap());
+        let error = picture_error(&gpu, &scene.build().unwrap());
         // 0.068 where vertices alone evaluate lights, and 0.3 or more without a share.
         assert!(error < 0.08, "{name}: {error}");
     }
@@ -116,7 +115,7 @@ fn glass_around_a_bulb_takes_its_share() {
 /// What one node carries looks as if it stood there at rest.
 #[test]
 fn what_is_carried_together_shades_itself_as_at_rest() {
-    let Some(stage) = stage() else { return };
+    let Some(gpu) = gpu() else { return };
     let node = Node::still(Vec3::new(-0.2, 0.1, 0.0), DQuat::from_rotation_y(0.3), 0.9);
     let picture = |motion: Vec<Motion>| {
         let at = |mesh: &str, position: [f32; 3]| {
@@ -141,7 +140,7 @@ fn what_is_carried_together_shades_itself_as_at_rest() {
             .entity(EntityData { emission: Vec3::splat(10.0), ..at("bulb", [0.1, 0.85, 0.05]) });
         let bake = bake::Options { groups: true, vertices: 0, ..bake::Options::default() };
         let scene = scene.build().unwrap();
-        let mut frame = stage.frame(&scene, frame::Options { size: [96, 64], bake, ..frame::Options::default() });
+        let mut frame = gpu.frame(&scene, frame::Options { size: [96, 64], bake, ..frame::Options::default() });
         frame.render(&scene.at(0.0), Some(f32::INFINITY)).unwrap();
         frame.picture()
     };
@@ -210,7 +209,7 @@ fn wall_with_window() -> Mesh {
 /// edges that rays find.
 #[test]
 fn a_window_casts_a_patch_of_sunlight_and_its_highlight() {
-    let Some(stage) = stage() else { return };
+    let Some(gpu) = gpu() else { return };
     let gloss = Some(toml::from_str("roughness = 0.4").unwrap());
     for gloss in [None, gloss] {
         let sky = r#"sun = { toward = [0.3, 0.8, -0.9], angle_deg = 2, radiance = [900, 900, 900] }"#;
@@ -221,7 +220,7 @@ fn a_window_casts_a_patch_of_sunlight_and_its_highlight() {
             .mesh("floor", generate::cuboid(Vec3::new(4.0, 0.1, 4.0), 1))
             .entity(EntityData { position: Vec3::new(0.0, -0.05, 0.0), gloss, ..EntityData::of_mesh("floor") })
             .entity(EntityData::of_mesh("wall"));
-        let error = picture_error(&stage, &scene.build().unwrap());
+        let error = picture_error(&gpu, &scene.build().unwrap());
         assert!(error < 0.11, "{error}");
     }
 }
@@ -229,7 +228,7 @@ fn a_window_casts_a_patch_of_sunlight_and_its_highlight() {
 /// A lamp in a thin box hangs right below a slab: nothing of its light gets above that.
 #[test]
 fn no_light_comes_through_the_slab_above_a_lamp() {
-    let Some(stage) = stage() else { return };
+    let Some(gpu) = gpu() else { return };
     let slab =
         |position: Vec3, rotation: RotationData| EntityData { position, rotation, ..EntityData::of_mesh("slab") };
     let scene = Scene::builder()
@@ -244,6 +243,6 @@ fn no_light_comes_through_the_slab_above_a_lamp() {
             emission: Vec3::splat(3.0),
             ..EntityData::of_mesh("lamp")
         });
-    let error = picture_error(&stage, &scene.build().unwrap());
+    let error = picture_error(&gpu, &scene.build().unwrap());
     assert!(error < 0.04, "{error}");
 }

@@ -2,7 +2,8 @@
 //! vertex, though a cluster has one list; among occluders there is one order for a whole receiver, by the distance from
 //! its centre in f32, ties by index, and what that differs from an order of each vertex's own is bounded here.
 
-use crate::stage;
+use crate::common::{Gpu, gpu};
+use crate::stage::{difference, scene, small};
 use glam::DVec3;
 use shadow_fields::check::merge::ARITHMETIC;
 use shadow_fields::field::ShadowField;
@@ -11,7 +12,6 @@ use shadow_fields::lists::gather::{EntityBounds, SceneBounds};
 use shadow_fields::lists::skip::Skip;
 use shadow_fields::merge::twin::{MergeObject, MergeTwin};
 use shadow_fields::scene::Scene;
-use stage::{Stage, scene, small, stage};
 use std::collections::BTreeMap;
 
 /// A patch of one cluster below a light, and below it an occluder on either side, both about as far from the patch as
@@ -107,10 +107,10 @@ fn apart(found: &[[f32; 3]], expected: &[[f64; 3]]) -> f64 {
     pairs().map(|(f, e)| (f - e).abs()).fold(0.0, f64::max) / pairs().map(|(_, e)| e).fold(0.0, f64::max)
 }
 
-fn lit(stage: &Stage, occluders: &[[f64; 3]]) -> (Frame, Vec<[f32; 3]>) {
+fn lit(gpu: &Gpu, occluders: &[[f64; 3]]) -> (Frame, Vec<[f32; 3]>) {
     let scene = patch(occluders);
-    let mut frame = stage.frame(&scene, small());
-    let light = stage.light(&mut frame, &scene.at(0.0)).swap_remove(0);
+    let mut frame = gpu.frame(&scene, small());
+    let light = gpu.light(&mut frame, &scene.at(0.0)).swap_remove(0);
     assert_eq!((light.len(), frame.merged().clusters), (64, 1), "one cluster, one list");
     (frame, light)
 }
@@ -119,13 +119,13 @@ fn lit(stage: &Stage, occluders: &[[f64; 3]]) -> (Frame, Vec<[f32; 3]>) {
 /// vertex is right.
 #[test]
 fn before_or_behind_a_light_is_decided_by_the_vertex() {
-    let Some(stage) = stage() else { return };
+    let Some(gpu) = gpu() else { return };
     for place in [A, B, [0.02, 0.9995, 0.3], [-0.1, 0.995, 0.0]] {
-        let (frame, light) = lit(&stage, &[place]);
+        let (frame, light) = lit(&gpu, &[place]);
         let (expected, orders) = by_vertex(&frame, &own);
         assert_eq!(orders.len(), 2, "before the light for some, behind it for others: {orders:?}");
         assert!(apart(&light, &expected) < ARITHMETIC, "{place:?}: {:e}", apart(&light, &expected));
-        let (without, _) = lit(&stage, &[]);
+        let (without, _) = lit(&gpu, &[]);
         let (open, _) = by_vertex(&without, &own);
         assert!(apart(&light, &open) > 0.01, "the occluder counts at all");
     }
@@ -136,8 +136,8 @@ fn before_or_behind_a_light_is_decided_by_the_vertex() {
 /// order, which is the stated one.
 #[test]
 fn two_occluders_about_as_far_as_a_light() {
-    let Some(stage) = stage() else { return };
-    let (frame, light) = lit(&stage, &[A, B]);
+    let Some(gpu) = gpu() else { return };
+    let (frame, light) = lit(&gpu, &[A, B]);
     let (expected, orders) = by_vertex(&frame, &own);
     let from_own = apart(&light, &expected);
     let (stated, _) = by_vertex(&frame, &|_, occluders| occluders.sort_unstable());
@@ -150,10 +150,10 @@ fn two_occluders_about_as_far_as_a_light() {
     assert!(from_own < 2e-3, "{from_own:e}");
 
     // A hair nearer, the second comes first; and nobody sees it.
-    let (frame, turned) = lit(&stage, &[A, [B[0], B[1] - 1e-6, B[2]]]);
+    let (frame, turned) = lit(&gpu, &[A, [B[0], B[1] - 1e-6, B[2]]]);
     let (expected, _) = by_vertex(&frame, &|_, occluders| occluders.reverse());
     assert!(apart(&turned, &expected) < ARITHMETIC, "by distance from the receiver's centre");
-    let (step, brightest) = stage::difference(&turned, &light);
+    let (step, brightest) = difference(&turned, &light);
     assert!(step < 2e-3 * brightest, "{step} of {brightest}");
 }
 

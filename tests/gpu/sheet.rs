@@ -1,13 +1,12 @@
 //! Sheets against rays: grounds, walls and ceilings that are rectangles, and what moves past them.
 
-use crate::common::relative_rms;
-use crate::stage;
+use crate::common::{Gpu, gpu, relative_rms};
+use crate::stage::{scene, small};
 use shadow_fields::bake::{self, Quality};
 use shadow_fields::check::merge::ROOM;
 use shadow_fields::frame;
 use shadow_fields::scene::{Lights, Scene};
 use shadow_fields::truth::{RayCast, Vertex, World};
-use stage::{Stage, scene, small, stage};
 
 /// The fields that the command line bakes by default, in f32, of meshes as they are.
 fn defaults(lights: Lights) -> frame::Options {
@@ -26,8 +25,8 @@ fn truth(scene: &Scene, time_s: f64, entity: usize, every: usize, rays: u32) -> 
 }
 
 /// Relative RMS of an entity's light against rays.
-fn error(stage: &Stage, frame: &mut frame::Frame, scene: &Scene, time_s: f64, entity: usize, every: usize) -> f64 {
-    let light = stage.light(frame, &scene.at(time_s)).swap_remove(entity);
+fn error(gpu: &Gpu, frame: &mut frame::Frame, scene: &Scene, time_s: f64, entity: usize, every: usize) -> f64 {
+    let light = gpu.light(frame, &scene.at(time_s)).swap_remove(entity);
     let (chosen, truth) = truth(scene, time_s, entity, every, 1024);
     relative_rms(chosen.iter().zip(truth).map(|(&v, truth)| (f64::from(light[v][0]), truth)))
 }
@@ -36,22 +35,22 @@ const WHITE: &str = "albedo = [1, 1, 1]";
 
 #[test]
 fn an_object_on_a_ground_is_lit_as_by_rays() {
-    let Some(stage) = stage() else { return };
+    let Some(gpu) = gpu() else { return };
     let text = format!(
         "environment = {{ uniform = [1, 1, 1] }}\n[[mesh]]\nname = \"floor\"\nplane = {{ size_m = 6, cells = 2 }}\n\
          [[mesh]]\nname = \"pot\"\nfile = \"assets/meshes/teapot.obj\"\n\
          [[entity]]\nmesh = \"floor\"\n[[entity]]\nmesh = \"pot\"\nscale = 0.5\n{WHITE}\n"
     );
     let scene = scene(&text);
-    let mut frame = stage.frame(&scene, defaults(Lights::Sharp));
-    let found = error(&stage, &mut frame, &scene, 0.0, 1, 3);
+    let mut frame = gpu.frame(&scene, defaults(Lights::Sharp));
+    let found = error(&gpu, &mut frame, &scene, 0.0, 1, 3);
     assert!(found < 0.006, "{found}");
 }
 
 /// A ball rolls along a wall, then off the edge of its ground, in steps of 2 cm, under a sky that is brighter above.
 #[test]
 fn a_ball_along_a_wall_and_over_an_edge() {
-    let Some(stage) = stage() else { return };
+    let Some(gpu) = gpu() else { return };
     let text = format!(
         "environment = {{ gradient = {{ radiance = [1, 1, 1] }} }}\n\
          [[mesh]]\nname = \"plane\"\nplane = {{ size_m = 4, cells = 2 }}\n\
@@ -61,15 +60,15 @@ fn a_ball_along_a_wall_and_over_an_edge() {
          [[entity]]\nmesh = \"ball\"\nposition = [0, 0.3, 0]\n{WHITE}\nmotion = [{{ bob = {{ amplitude_m = 2.5, period_s = 4, axis = [1, 0, 0] }} }}]\n"
     );
     let scene = scene(&text);
-    let mut frame = stage.frame(&scene, defaults(Lights::Sharp));
+    let mut frame = gpu.frame(&scene, defaults(Lights::Sharp));
     let mut worst = 0.0_f64;
     let mut pop = 0.0_f64;
     let mut walk: Vec<Vec<[f32; 3]>> = Vec::new();
     for step in 0..=100 {
         let time_s = f64::from(step) / 100.0;
-        walk.push(stage.light(&mut frame, &scene.at(time_s)).swap_remove(2));
+        walk.push(gpu.light(&mut frame, &scene.at(time_s)).swap_remove(2));
         if step % 10 == 0 {
-            let found = error(&stage, &mut frame, &scene, time_s, 2, 3);
+            let found = error(&gpu, &mut frame, &scene, time_s, 2, 3);
             worst = worst.max(found);
         }
         // A step that neither neighbour's slope explains. Of single vertices near the ground's edge it is large in truth.
@@ -85,16 +84,16 @@ fn a_ball_along_a_wall_and_over_an_edge() {
 /// A ring between walls, by single fields and by their volume; and out of it, in steps of 1 cm.
 #[test]
 fn what_moves_in_a_room_sees_all_its_walls_at_once() {
-    let Some(stage) = stage() else { return };
+    let Some(gpu) = gpu() else { return };
     let scene = scene(ROOM);
     let ring = scene.entities.len() - 1;
     let with = |groups: bool| {
         let options = defaults(Lights::Sharp);
         frame::Options { bake: bake::Options { groups, ..options.bake }, ..options }
     };
-    let errors = |frame: &mut frame::Frame| [0.0, 0.4, 3.2].map(|t| error(&stage, frame, &scene, t, ring, 3));
-    let mut alone = stage.frame(&scene, with(false));
-    let mut frame = stage.frame(&scene, with(true));
+    let errors = |frame: &mut frame::Frame| [0.0, 0.4, 3.2].map(|t| error(&gpu, frame, &scene, t, ring, 3));
+    let mut alone = gpu.frame(&scene, with(false));
+    let mut frame = gpu.frame(&scene, with(true));
     let found = errors(&mut frame);
     let by_fields = errors(&mut alone);
     assert!(found.iter().all(|error| *error < 0.1), "{found:?}");
@@ -103,7 +102,7 @@ fn what_moves_in_a_room_sees_all_its_walls_at_once() {
     let mut walk: Vec<Vec<[f32; 3]>> = Vec::new();
     for _ in 0..60 {
         placements[ring].position.z += 0.01;
-        walk.push(stage.light(&mut frame, &placements).swap_remove(ring));
+        walk.push(gpu.light(&mut frame, &placements).swap_remove(ring));
     }
     let mut pop = 0.0_f64;
     for step in walk.windows(3) {
@@ -116,7 +115,7 @@ fn what_moves_in_a_room_sees_all_its_walls_at_once() {
 /// Balls of light beyond a wall, one that the wall's rim cuts, one below a ground, and a lamp that lies on a ceiling.
 #[test]
 fn sheets_hide_sharp_lights() {
-    let Some(stage) = stage() else { return };
+    let Some(gpu) = gpu() else { return };
     let lit = |rest: &str, lights: Lights| {
         let text = format!(
             "[[mesh]]\nname = \"plane\"\nplane = {{ size_m = 2, cells = 1 }}\n\
@@ -126,9 +125,9 @@ fn sheets_hide_sharp_lights() {
              [[entity]]\nmesh = \"field\"\n{WHITE}\n{rest}"
         );
         let scene = scene(&text);
-        let mut frame = stage.frame(&scene, defaults(lights));
-        let brightest = stage.light(&mut frame, &scene.at(0.0))[0].iter().map(|v| v[0]).fold(0.0, f32::max);
-        (error(&stage, &mut frame, &scene, 0.0, 0, 2), brightest)
+        let mut frame = gpu.frame(&scene, defaults(lights));
+        let brightest = gpu.light(&mut frame, &scene.at(0.0))[0].iter().map(|v| v[0]).fold(0.0, f32::max);
+        (error(&gpu, &mut frame, &scene, 0.0, 0, 2), brightest)
     };
     let glow = "receives = false\nemission = [9, 9, 9]";
     let wall = "[[entity]]\nmesh = \"plane\"\nposition = [0.13, 0.4, 0]\nscale = 0.4\nreceives = false\n\

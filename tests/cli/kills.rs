@@ -4,8 +4,8 @@
 //! The variable SHADOW_FIELDS_KILLS says how many rounds there are for each number of processes; without it there are 2.
 #![cfg(unix)]
 
-use crate::cli::{bare, finish, has_device, limited, names};
-use crate::common::{Running, report};
+use crate::cli::{bare, finish, has_device, limited};
+use crate::common::{Running, names, report};
 use crate::room;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};

@@ -2,7 +2,7 @@
 
 #![allow(dead_code)] // every test binary uses its own part
 
-use super::common;
+use super::common::{self, names};
 use serde_json::Value;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -59,14 +59,6 @@ pub fn good(folder: &Path, line: &str) -> Ran {
     let ran = finish(&mut command(folder, line));
     assert_eq!(ran.code, 0, "{line}: {}", ran.stderr);
     ran
-}
-
-/// Names in a folder, sorted.
-pub fn names(folder: &Path) -> Vec<String> {
-    let entries = std::fs::read_dir(folder).unwrap();
-    let mut names: Vec<_> = entries.map(|e| e.unwrap().file_name().into_string().unwrap()).collect();
-    names.sort();
-    names
 }
 
 /// Whether a device is there, as the program sees it.

@@ -10,8 +10,9 @@ pub use shadow_fields::asset::generate;
 
 use glam::Vec3;
 use shadow_fields::asset::Mesh;
-use shadow_fields::bake::Baker;
 use shadow_fields::bake::cache::Cache;
+use shadow_fields::bake::{self, Baker};
+use shadow_fields::farm::{Film, Input, Plan};
 use shadow_fields::frame::{self, Frame};
 use shadow_fields::gpu::{Device, DeviceOptions, Validation};
 use shadow_fields::scene::{Placement, Scene};
@@ -36,6 +37,14 @@ pub fn skip(reason: &str) {
 #[allow(clippy::print_stderr)]
 pub fn report(line: &str) {
     eprintln!("{line}");
+}
+
+/// Names in a folder, sorted.
+pub fn names(folder: &Path) -> Vec<String> {
+    let entries = std::fs::read_dir(folder).unwrap();
+    let mut names: Vec<_> = entries.map(|e| e.unwrap().file_name().into_string().unwrap()).collect();
+    names.sort();
+    names
 }
 
 /// A program that is ended with the test.
@@ -139,6 +148,20 @@ pub fn parse(text: &str) -> Scene {
     Scene::parse(text, Path::new("test.toml"), &shadow_fields::asset::embedded::read).unwrap()
 }
 
+/// Meshes in one, each moved.
+pub fn joined(parts: &[(&Mesh, Vec3)]) -> Mesh {
+    let mut positions = Vec::new();
+    let mut normals = Vec::new();
+    let mut triangles = Vec::new();
+    for (part, by) in parts {
+        let first = positions.len() as u32;
+        positions.extend(part.positions.iter().map(|p| *p + *by));
+        normals.extend(&part.normals);
+        triangles.extend(part.triangles.iter().map(|t| t.map(|i| i + first)));
+    }
+    Mesh::new("joined", positions, normals, None, triangles).unwrap()
+}
+
 /// A mesh's places and triangles as OBJ text.
 pub fn obj(mesh: &Mesh) -> String {
     let places = mesh.positions.iter().map(|p| format!("v {} {} {}\n", p.x, p.y, p.z));
@@ -158,11 +181,23 @@ pub fn huge_png() -> Vec<u8> {
     png
 }
 
+/// A plan of two meshes and of two pictures, each a slice.
+pub fn plan() -> Plan {
+    let mut plan = Plan::new("a (b)".into(), "results".into(), bake::Options::default());
+    let input = |path: &str| Input { path: path.into(), hash: path.into() };
+    plan.add_meshes(["a.obj", "b.obj"].map(input).into(), 1);
+    let options = frame::Options::default();
+    let film =
+        Film { scene: input("s.toml"), pictures: "f_#.png".into(), options, exposure_ev: 0.0, first_s: 0.0, fps: 24 };
+    plan.add_film(film, 2, 1);
+    plan
+}
+
 /// Root mean square of what found numbers are off true ones by, relative to that of the true ones.
-pub fn relative_rms(found_and_true: impl IntoIterator<Item = (f64, f64)>) -> f64 {
-    let mut off = 0.0;
+pub fn relative_rms<T: Into<f64>>(found_and_true: impl IntoIterator<Item = (T, T)>) -> f64 {
+    let mut off = 0.0_f64;
     let mut whole = 0.0;
-    for (found, truth) in found_and_true {
+    for (found, truth) in found_and_true.into_iter().map(|(found, truth)| (found.into(), truth.into())) {
         off += (found - truth).powi(2);
         whole += truth * truth;
     }

@@ -12,7 +12,6 @@ use shadow_fields::scene::data::EntityData;
 use shadow_fields::scene::motion::{Motion, Node, RotationData};
 use shadow_fields::scene::{Camera, Scene};
 use shadow_fields::truth::pixels;
-use shadow_fields::truth::ray_mesh::RayMeshes;
 use shadow_fields::truth::raycast::RayCast;
 use shadow_fields::truth::world::World;
 use std::f32::consts::TAU;
@@ -29,11 +28,10 @@ fn picture_error(gpu: &Gpu, scene: &Scene) -> f64 {
     let placements = scene.at(0.0);
     let mut frame = gpu.frame(scene, options);
     frame.render(&placements, Some(f32::INFINITY)).unwrap();
-    let shapes = RayMeshes::new(scene);
-    let world = World::new(scene, &shapes, &placements);
+    let world = World::of(scene, &placements);
     let rays = pixels::picture(&world, size, true, &RayCast { rays: 512, runs: 2, ..RayCast::default() }, &|_| ());
     // The lamp itself is brighter than all that it lights.
-    let pairs = frame.picture().into_iter().zip(rays.linear).map(|(found, truth)| (f64::from(found), f64::from(truth)));
+    let pairs = frame.picture().into_iter().zip(rays.linear);
     relative_rms(pairs.filter(|(found, truth)| found.max(*truth) < 0.6))
 }
 
@@ -145,9 +143,16 @@ fn what_is_carried_together_shades_itself_as_at_rest() {
         frame.picture()
     };
     let pairs = picture(vec![Motion::Node(Box::new(node.clone()))]).into_iter().zip(picture(Vec::new()));
-    let error = relative_rms(pairs.map(|(carried, rests)| (f64::from(carried), f64::from(rests))));
+    let error = relative_rms(pairs);
     // Rays are cast in the frame of the group.
     assert!(error < 0.015, "{error}");
+}
+
+/// A mesh of quads, four corners each.
+fn of_quads(name: &str, corners: Vec<Vec3>) -> Mesh {
+    let quads = 0..corners.len() as u32 / 4;
+    let triangles = quads.flat_map(|i| [[4 * i, 4 * i + 1, 4 * i + 2], [4 * i, 4 * i + 2, 4 * i + 3]]).collect();
+    Mesh::new(name, corners, Vec::new(), None, triangles).unwrap()
 }
 
 /// A bulb that high within a shade, which is a profile (radius, height) turned around.
@@ -164,9 +169,7 @@ fn under_a_shade(profile: &[[f32; 2]], height: f32) -> Scene {
         let next = i / count * count + (i + 1) % count;
         corners.extend([i, next, next + count, i + count].map(|i| place(i % (count * sides))));
     }
-    let quads = 0..count * sides;
-    let triangles = quads.flat_map(|i| [[4 * i, 4 * i + 1, 4 * i + 2], [4 * i, 4 * i + 2, 4 * i + 3]]).collect();
-    let shade = Mesh::new("shade", corners, Vec::new(), None, triangles).unwrap();
+    let shade = of_quads("shade", corners);
     let slab =
         |position: Vec3, rotation: RotationData| EntityData { position, rotation, ..EntityData::of_mesh("slab") };
     let scene = Scene::builder()
@@ -200,9 +203,7 @@ fn wall_with_window() -> Mesh {
         corners.extend([place(b, 0.05), place(a, 0.05), place(a, -0.05), place(b, -0.05)]);
         corners.extend([place(d, 0.05), place(c, 0.05), place(c, -0.05), place(d, -0.05)]);
     }
-    let quads = 0..corners.len() as u32 / 4;
-    let triangles = quads.flat_map(|i| [[4 * i, 4 * i + 1, 4 * i + 2], [4 * i, 4 * i + 2, 4 * i + 3]]).collect();
-    Mesh::new("wall", corners, Vec::new(), None, triangles).unwrap()
+    of_quads("wall", corners)
 }
 
 /// Sunlight falls through a window onto a glossy floor of two triangles: its patch and the highlight within have the

@@ -9,7 +9,7 @@ use shadow_fields::frame;
 use shadow_fields::lists::skip::{Skip, TABLE};
 use shadow_fields::scene::{Placement, Scene};
 use shadow_fields::truth::raycast::RayCast;
-use shadow_fields::truth::{RayMeshes, Vertex, World};
+use shadow_fields::truth::{Vertex, World};
 use std::fmt::Write;
 
 /// Balls and rings on a floor, some of them lights, on a grid with `step_m` between them.
@@ -99,9 +99,7 @@ fn a_refused_frame_is_done_again() {
     let scene = town(3, 2.0, 1);
     let mut frame = gpu.frame(&scene, small());
     let placements = scene.at(0.0);
-    gpu.device.omit_barrier(Some(0));
-    assert!(frame.render(&placements, Some(1.0)).is_err());
-    gpu.device.omit_barrier(None);
+    assert!(gpu.without_barrier(0, || frame.render(&placements, Some(1.0))).is_err());
     gpu.device.take_validation_messages();
     let passes = frame.render(&placements, Some(1.0)).unwrap();
     assert!(passes.iter().any(|t| t.pass == "merge"), "{passes:?}");
@@ -188,11 +186,9 @@ fn what_is_dropped_stays_within_its_bound() {
     let mut full = gpu.frame(&town, small());
     let exact = gpu.light(&mut full, &placements);
     let all = full.listed(&placements, 0);
-    let shapes = RayMeshes::new(&town);
-    let world = World::new(&town, &shapes, &placements);
     let vertices: Vec<Vertex> = (0..exact[0].len()).map(|index| Vertex { entity: 0, index }).collect();
     let cast = RayCast { rays: 1 << 13, ..Default::default() };
-    let truth = cast.run(&world, &vertices);
+    let truth = cast.run(&World::of(&town, &placements), &vertices);
     for eps in [1e-3, 5e-3, 2e-2] {
         let mut frame = gpu.frame(&town, frame::Options { eps, ..small() });
         let light = gpu.light(&mut frame, &placements);
@@ -204,7 +200,7 @@ fn what_is_dropped_stays_within_its_bound() {
             entity.occludes &= listed.contains(&j);
             entity.emits &= listed.contains(&j);
         }
-        let without = cast.run(&World::new(&bare, &shapes, &placements), &vertices);
+        let without = cast.run(&World::of(&bare, &placements), &vertices);
         let pairs = truth.iter().zip(&without);
         let by_rays = pairs
             .flat_map(|(a, b)| (0..3).map(move |c| (a.radiosity[c] - b.radiosity[c]).abs()))

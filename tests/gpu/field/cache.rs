@@ -143,7 +143,7 @@ fn without_a_folder_a_bake_is_kept_in_memory() {
     let Some(gpu) = gpu() else { return };
     let mesh = generate::torus(1.0, 0.3, 12, 8);
     let options = small("cube:2x1", Storage::F16, 2);
-    let baker = Baker::new(&gpu.device, &gpu.library);
+    let baker = gpu.baker();
     let header = bake::header(&mesh, FieldKind::Occlusion, &options);
     let alone = GroupPlan::alone(&Arc::new(mesh.clone()), &options, Wanted::TRANSFER);
     for _ in 0..2 {

@@ -6,7 +6,7 @@ use shadow_fields::asset::environment::EnvironmentData;
 use shadow_fields::bake;
 use shadow_fields::frame::{self, Frame};
 use shadow_fields::gpu::Gpu;
-use shadow_fields::prelude::{Cache, Camera, DeviceOptions, EntityData, Error, Generator, Quality};
+use shadow_fields::prelude::{Cache, Camera, EntityData, Error, Generator, Quality};
 use shadow_fields::prelude::{Placement, RenderOptions, Renderer, Scene};
 use shadow_fields::scene::{Lights, Output, SceneBuilder};
 
@@ -169,13 +169,4 @@ fn a_renderer_lights_its_scene_at_once_and_refuses_what_is_no_placement() {
     ] {
         assert!(matches!(Renderer::new(&door, &scene, &options), Err(Error::Input(_))));
     }
-}
-
-#[test]
-fn a_device_that_is_named_wrongly_is_refused() {
-    if gpu().is_none() {
-        return;
-    }
-    let options = DeviceOptions { device: Some("no such device".into()), ..Default::default() };
-    assert!(matches!(Gpu::own(&options), Err(Error::Unsupported(_))));
 }

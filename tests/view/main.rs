@@ -11,6 +11,8 @@ mod lights;
 mod panel;
 mod selection;
 
+#[path = "../common/mod.rs"]
+mod common;
 #[path = "../common/model.rs"]
 mod model;
 

@@ -240,16 +240,6 @@ fn built_in_meshes_are_found_from_any_scene() {
     assert!(error.contains("no.obj") && error.contains("s.toml:4: "), "{error}");
 }
 
-#[test]
-fn camera_up() {
-    let camera = |eye: &str| {
-        let text = format!("[camera]\neye = {eye}\ntarget = [0, 0, 0]\nfov_deg = 30\n");
-        Scene::parse(&text, Path::new("c.toml"), &nothing).unwrap().data.camera
-    };
-    assert_eq!(camera("[0, 1, 1]").up(), Vec3::Y);
-    assert_eq!(camera("[0, 4, 0]").up(), Vec3::NEG_Z);
-}
-
 /// Loads the scene that documentation shows, from a folder that has the picture it names.
 fn documented(text: &str) -> Scene {
     let folder = tempfile::tempdir().unwrap();

@@ -1,7 +1,7 @@
 //! Plans of farms and results of slices, as any machine may find them in a shared folder.
 
 use super::common;
-use super::targets::{NAME, bordered, sealed, with_file};
+use super::targets::{NAME, framed, unframed, with_file};
 use shadow_fields::Result;
 use shadow_fields::error::Error;
 use shadow_fields::farm::Plan;
@@ -50,13 +50,13 @@ pub fn slices() -> Vec<Vec<u8>> {
         std::fs::write(folder.path().join("a.sf"), [7; 20]).unwrap();
         std::fs::write(folder.path().join("b"), []).unwrap();
         results::write(plan, 0, folder.path(), 2).unwrap();
-        vec![bordered(std::fs::read(path).unwrap())]
+        vec![unframed(&std::fs::read(path).unwrap())]
     })
 }
 
 pub fn slice(bytes: &[u8]) -> Result<()> {
     with_plan(|plan, path| {
-        std::fs::write(path, sealed(bytes)).unwrap();
+        std::fs::write(path, framed(bytes, *b"SHSLICE\n")).unwrap();
         assert_eq!(missing(plan), [1, 2, 3]);
         match results::find(plan, 0) {
             SliceResult::Whole(files) => {

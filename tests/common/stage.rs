@@ -5,7 +5,7 @@
 pub use super::common::{Gpu as Stage, gpu as stage};
 
 use super::common::parse;
-use glam::{Quat, Vec3};
+use glam::{EulerRot, Quat, Vec3};
 use shadow_fields::frame;
 use shadow_fields::scene::{Placement, Scene};
 
@@ -22,6 +22,14 @@ pub fn scene(text: &str) -> Scene {
 /// An object upright at a place in its own size.
 pub fn at(x: f32, y: f32, z: f32) -> Placement {
     Placement { position: Vec3::new(x, y, z), rotation: Quat::IDENTITY, scale: 1.0 }
+}
+
+/// The same a little further on, by at most `reach_m` level and a fifth of that upwards, and turned.
+pub fn jostled(place: &Placement, rng: &mut fastrand::Rng, reach_m: f32) -> Placement {
+    let mut step = || (rng.f32() - 0.5) * 2.0 * reach_m;
+    let position = place.position + Vec3::new(step(), 0.2 * step(), step());
+    let rotation = (Quat::from_euler(EulerRot::XYZ, step(), step(), step()) * place.rotation).normalize();
+    Placement { position, rotation, scale: place.scale }
 }
 
 /// Largest of all differences, and the largest magnitude of `b`.

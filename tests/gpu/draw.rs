@@ -1,8 +1,8 @@
 //! Pictures: what stands where, what hides what, and in which colour.
 
-use crate::common::{Gpu, gpu};
+use crate::common::{Gpu, gpu, relative_rms};
 use crate::stage::{at, scene, small};
-use glam::{Quat, Vec2, Vec3};
+use glam::{DVec2, EulerRot, Quat, Vec2, Vec3};
 use shadow_fields::asset::environment::EnvironmentData;
 use shadow_fields::asset::mesh::Attributes;
 use shadow_fields::asset::texture::{Texels, Texture, Wrap};
@@ -38,9 +38,7 @@ fn draw(gpu: &Gpu, scene: &Scene, places: &[[f32; 3]], antialias: Antialias, whi
     let placements: Vec<_> = places.iter().map(|&[x, y, z]| at(x, y, z)).collect();
     let mut frame = gpu.frame(scene, options(antialias));
     frame.render(&placements, Some(white)).unwrap();
-    let picture = frame.picture();
-    assert_eq!(picture.len(), 3 * WIDTH * HEIGHT);
-    picture.chunks_exact(3).map(|p| [p[0], p[1], p[2]]).collect()
+    frame.picture().as_chunks().0.to_vec()
 }
 
 /// Middle of what has a channel, in pixels from the left and the top, and its area in pixels.
@@ -189,16 +187,15 @@ fn outlines_are_smoother_than_four_samples() {
         [[mesh]]\nname = \"floor\"\nplane = { size_m = 3, cells = 4 }\n\
         [[entity]]\nmesh = \"box\"\n[[entity]]\nmesh = \"floor\"\nalbedo = [0.3, 0.6, 0.3]\n";
     let scene = scene(&(text.to_owned() + &ball("[0.9, 0.5, 0.3]") + &ball("[0.2, 0.6, 0.9]")));
-    let turned = glam::Quat::from_euler(glam::EulerRot::YXZ, 0.5, 0.6, 0.2);
-    let tilted = glam::Quat::from_rotation_x(0.4);
+    let turned = Quat::from_euler(EulerRot::YXZ, 0.5, 0.6, 0.2);
+    let tilted = Quat::from_rotation_x(0.4);
     let placements = [
         Placement { rotation: turned, ..at(0.6, 0.3, 0.3) },
         Placement { rotation: tilted, ..at(0.1, -0.4, 0.0) },
         at(-0.8, 0.2, 0.0),
         at(-0.5, 0.4, -0.6),
     ];
-    let grid: Vec<glam::DVec2> =
-        (0..64).map(|i| (glam::DVec2::new(f64::from(i % 8), f64::from(i / 8)) + 0.5) / 8.0).collect();
+    let grid: Vec<DVec2> = (0..64).map(|i| (DVec2::new(f64::from(i % 8), f64::from(i / 8)) + 0.5) / 8.0).collect();
     let mut wanted = Vec::new();
     let [none, samples, outlines] = [Antialias::None, Antialias::Samples, Antialias::Outlines].map(|antialias| {
         let mut frame = gpu.frame(&scene, options(antialias));
@@ -206,16 +203,9 @@ fn outlines_are_smoother_than_four_samples() {
         if wanted.is_empty() {
             wanted = frame.twin_texels(&placements, 1.0, &grid).unwrap();
         }
-        frame.picture()
+        let found = frame.picture().into_iter().map(f64::from);
+        relative_rms(found.zip(wanted.iter().flat_map(|texel| texel.color.to_array())))
     });
-    let error = |picture: &[f32]| {
-        let squares = picture.chunks_exact(3).zip(&wanted).map(|(found, wanted)| {
-            let found = glam::DVec3::new(found[0].into(), found[1].into(), found[2].into());
-            found.distance_squared(wanted.color)
-        });
-        (squares.sum::<f64>() / wanted.len() as f64).sqrt()
-    };
-    let [none, samples, outlines] = [none, samples, outlines].map(|picture| error(&picture));
     assert!(outlines < 0.4 * none && outlines < samples, "none {none}, samples {samples}, outlines {outlines}");
 }
 
@@ -306,18 +296,22 @@ fn lit_surfaces_have_their_radiosity() {
     }
 }
 
+/// A quad of two triangles with the whole of a texture on it.
+fn quad(corners: [[f32; 3]; 4], tints: Option<Vec<Vec3>>) -> Mesh {
+    let uvs = [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]].map(Vec2::from).to_vec();
+    let attributes = Attributes { uvs: Some(uvs), tints, ..Attributes::default() };
+    let corners = corners.map(Vec3::from).to_vec();
+    Mesh::with_attributes("quad", corners, Vec::new(), attributes, vec![[0, 1, 2], [0, 2, 3]]).unwrap()
+}
+
 /// A texture shows at every pixel what its texel reflects of the light that a grey surface gets there, whether the pixel
 /// evaluates a sharp light itself or not; what its alpha masks is not there.
 #[test]
 fn textures_multiply_the_light_of_a_grey_surface() {
     let Some(gpu) = gpu() else { return };
     let wall = |albedo: Albedo| {
-        let corners = [[-2.0, -2.0, 0.0], [2.0, -2.0, 0.0], [2.0, 2.0, 0.0], [-2.0, 2.0, 0.0]].map(Vec3::from).to_vec();
-        let uvs = [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]].map(Vec2::from).to_vec();
-        let tints = vec![Vec3::new(1.0, 0.25, 1.0); 4];
-        let attributes = Attributes { uvs: Some(uvs), tints: Some(tints), ..Attributes::default() };
-        let triangles = vec![[0, 1, 2], [0, 2, 3]];
-        let mesh = Mesh::with_attributes("wall", corners, Vec::new(), attributes, triangles).unwrap();
+        let corners = [[-2.0, -2.0, 0.0], [2.0, -2.0, 0.0], [2.0, 2.0, 0.0], [-2.0, 2.0, 0.0]];
+        let mesh = quad(corners, Some(vec![Vec3::new(1.0, 0.25, 1.0); 4]));
         let rgba = vec![[255, 0, 0, 255], [0, 255, 0, 255], [0, 0, 255, 255], [255, 255, 255, 100]];
         let texels = Some(Arc::new(Texels { width: 2, height: 2, rgba }));
         let factor = Vec3::new(0.5, 1.0, 1.0);
@@ -375,10 +369,7 @@ fn textures_multiply_the_light_of_a_grey_surface() {
 #[test]
 fn textures_are_even_under_four_samples() {
     let Some(gpu) = gpu() else { return };
-    let corners = [[-2.0, -1.0, 2.0], [2.0, -1.0, 2.0], [2.0, 0.5, -8.0], [-2.0, 0.5, -8.0]].map(Vec3::from).to_vec();
-    let uvs = [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]].map(Vec2::from).to_vec();
-    let attributes = Attributes { uvs: Some(uvs), ..Attributes::default() };
-    let mesh = Mesh::with_attributes("floor", corners, Vec::new(), attributes, vec![[0, 1, 2], [0, 2, 3]]).unwrap();
+    let mesh = quad([[-2.0, -1.0, 2.0], [2.0, -1.0, 2.0], [2.0, 0.5, -8.0], [-2.0, 0.5, -8.0]], None);
     let rgba = (0..16 * 16).map(|i| [255 * (i as u8 % 2), 255 * (i / 16 % 2) as u8, 0, 255]).collect();
     let texels = Some(Arc::new(Texels { width: 16, height: 16, rgba }));
     let texture = Texture { texels, wrap: [Wrap::Clamp; 2], factor: Vec3::ONE, alpha_cutoff: None, alpha_blend: false };

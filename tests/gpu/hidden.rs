@@ -2,8 +2,8 @@
 //! may be seen or once nothing moves.
 
 use crate::common::{Gpu, gpu};
-use crate::stage::{scene, small};
-use glam::{Quat, Vec3};
+use crate::stage::{jostled, scene, small};
+use glam::Vec3;
 use shadow_fields::draw::Antialias;
 use shadow_fields::frame::{self, Frame};
 use shadow_fields::lists::skip::Skip;
@@ -29,13 +29,6 @@ fn room() -> Scene {
 
 fn camera(eye: [f32; 3], target: [f32; 3], fov_deg: f32) -> Camera {
     Camera { eye: eye.into(), target: target.into(), fov_deg }
-}
-
-fn jostled(place: &Placement, rng: &mut fastrand::Rng) -> Placement {
-    let mut step = || (rng.f32() - 0.5) * 0.3;
-    let position = place.position + Vec3::new(step(), 0.2 * step(), step());
-    let rotation = (Quat::from_euler(glam::EulerRot::XYZ, step(), step(), step()) * place.rotation).normalize();
-    Placement { position, rotation, scale: place.scale }
 }
 
 /// Bits of a picture: as files have it, or as a window shows it.
@@ -79,7 +72,7 @@ fn pictures_are_the_same_to_the_bit() {
                 _ => vec![rng.usize(1..placements.len()), rng.usize(0..placements.len())],
             };
             for &j in &movers {
-                placements[j] = jostled(&placements[j], &mut rng);
+                placements[j] = jostled(&placements[j], &mut rng, 0.15);
             }
             let pictures = frames.each_mut().map(|frame| {
                 frame.set_camera(&eye(round));

@@ -20,6 +20,10 @@ fn turned(axis: Vec3, angle_deg: f64) -> RotationData {
     RotationData::AxisAngle { axis, angle_deg }
 }
 
+fn slab(position: Vec3, rotation: RotationData) -> EntityData {
+    EntityData { position, rotation, ..EntityData::of_mesh("slab") }
+}
+
 /// Relative RMS of a scene's picture against rays through its pixels, direct light alone.
 fn picture_error(gpu: &Gpu, scene: &Scene) -> f64 {
     let size = [96, 64];
@@ -170,8 +174,6 @@ fn under_a_shade(profile: &[[f32; 2]], height: f32) -> Scene {
         corners.extend([i, next, next + count, i + count].map(|i| place(i % (count * sides))));
     }
     let shade = of_quads("shade", corners);
-    let slab =
-        |position: Vec3, rotation: RotationData| EntityData { position, rotation, ..EntityData::of_mesh("slab") };
     let scene = Scene::builder()
         .camera(Camera::new([0.2, 1.1, 2.6], [0.0, 0.4, 0.0]))
         .mesh("slab", generate::cuboid(Vec3::new(4.0, 0.1, 4.0), 1))
@@ -230,8 +232,6 @@ fn a_window_casts_a_patch_of_sunlight_and_its_highlight() {
 #[test]
 fn no_light_comes_through_the_slab_above_a_lamp() {
     let Some(gpu) = gpu() else { return };
-    let slab =
-        |position: Vec3, rotation: RotationData| EntityData { position, rotation, ..EntityData::of_mesh("slab") };
     let scene = Scene::builder()
         .camera(Camera::new([0.2, 2.4, 3.2], [0.0, 0.8, 0.0]))
         .mesh("slab", generate::cuboid(Vec3::new(2.4, 0.1, 2.4), 1))

@@ -16,11 +16,6 @@ fn fine() -> frame::Options {
     }
 }
 
-/// The lattice and faces that the command line bakes by default, in f32.
-fn defaults() -> frame::Options {
-    frame::Options { bake: bake::Options { storage: small().bake.storage, ..Default::default() }, ..small() }
-}
-
 /// The same radiance 1 from everywhere.
 const WHITE_SKY: &str = "environment = { uniform = [1, 1, 1] }\n";
 const PATCH: &str = "[[mesh]]\nname = \"patch\"\nplane = { size_m = 1, cells = 2 }\n";
@@ -128,42 +123,27 @@ fn pop(walk: &[f64]) -> f64 {
         .fold(0.0, f64::max)
 }
 
-/// A patch, a box and two lights, one of them nearer than the box.
-const GROUP: &str = r#"
-[[mesh]]
-name = "floor"
-plane = { size_m = 4, cells = 16 }
-[[mesh]]
-name = "ring"
-torus = { major_m = 0.5, minor_m = 0.2, segments = 24, sides = 12 }
-[[entity]]
-mesh = "floor"
-[[entity]]
-mesh = "box"
-position = [0.317, 0.871, -0.213]
-rotation = { axis = [1, 0.3, -0.4], angle_deg = 67 }
-[[entity]]
-mesh = "ring"
-position = [-0.917, 0.671, 0.413]
-rotation = { axis = [0.2, 0.3, 1], angle_deg = 40 }
-[[entity]]
-mesh = "ball"
-position = [1.13, 1.61, 0.87]
-scale = 0.2
-emission = [5, 4, 3]
-[[entity]]
-mesh = "ball"
-position = [-1.31, 2.53, -0.79]
-scale = 0.3
-emission = [3, 4, 5]
-"#;
-
+/// A patch, a box, a ring and two lights, one of them nearer than the box, under a sky whose key comes from `key`.
 fn group(key: Vec3) -> Scene {
     let Vec3 { x, y, z } = key;
-    let sky = format!(
-        "uniform = [0.2, 0.2, 0.3], key = {{ radiance = [1, 0.9, 0.8], toward = [{x}, {y}, {z}], sharpness = 4 }}"
-    );
-    scene(&format!("environment = {{ {sky} }}\n{BALL}{BOX}{GROUP}"))
+    scene(&format!(
+        r#"
+environment = {{ uniform = [0.2, 0.2, 0.3], key = {{ radiance = [1, 0.9, 0.8], toward = [{x}, {y}, {z}], sharpness = 4 }} }}
+mesh = [
+    {{ name = "floor", plane = {{ size_m = 4, cells = 16 }} }},
+    {{ name = "ring", torus = {{ major_m = 0.5, minor_m = 0.2, segments = 24, sides = 12 }} }},
+    {{ name = "ball", sphere = {{ radius_m = 1, subdivisions = 3 }} }},
+    {{ name = "box", cuboid = {{ size_m = [1.6, 0.9, 0.7], cells = 4 }} }},
+]
+entity = [
+    {{ mesh = "floor" }},
+    {{ mesh = "box", position = [0.317, 0.871, -0.213], rotation = {{ axis = [1, 0.3, -0.4], angle_deg = 67 }} }},
+    {{ mesh = "ring", position = [-0.917, 0.671, 0.413], rotation = {{ axis = [0.2, 0.3, 1], angle_deg = 40 }} }},
+    {{ mesh = "ball", position = [1.13, 1.61, 0.87], scale = 0.2, emission = [5, 4, 3] }},
+    {{ mesh = "ball", position = [-1.31, 2.53, -0.79], scale = 0.3, emission = [3, 4, 5] }},
+]
+"#
+    ))
 }
 
 fn moved(placements: &[Placement], rotation: Quat, shift: Vec3, scale: f32) -> Vec<Placement> {
@@ -227,7 +207,9 @@ fn spinning_sphere_shows_the_interpolation_error() {
     let floor = "[[mesh]]\nname = \"floor\"\nplane = { size_m = 8, cells = 24 }\n";
     let text = format!("{WHITE_SKY}{floor}{BALL}{}{}", entity("floor", ""), entity("ball", "receives = false"));
     let scene = scene(&text);
-    let mut frame = gpu.frame(&scene, defaults());
+    // The lattice and faces that the command line bakes by default, in f32.
+    let bake = bake::Options { storage: small().bake.storage, ..Default::default() };
+    let mut frame = gpu.frame(&scene, frame::Options { bake, ..small() });
     let turned = |rotation| Placement { rotation, ..at(0.1, 1.1, -0.2) };
     let mut spins = Vec::new();
     for i in 0..12_u8 {

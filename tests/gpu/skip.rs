@@ -2,7 +2,7 @@
 //! merge; what is dropped as small stays within its bound.
 
 use crate::common::{gpu, parse};
-use crate::stage::{at, difference, scene, small};
+use crate::stage::{at, difference, jostled, scene, small};
 use glam::{Quat, Vec3};
 use shadow_fields::asset::Mesh;
 use shadow_fields::frame;
@@ -35,13 +35,6 @@ fn town(edge: usize, step_m: f32, lights: usize) -> Scene {
         );
     }
     scene(&text)
-}
-
-fn jostled(place: &Placement, rng: &mut fastrand::Rng, reach_m: f32) -> Placement {
-    let mut step = || (rng.f32() - 0.5) * 2.0 * reach_m;
-    let position = place.position + Vec3::new(step(), 0.1 * step(), step());
-    let rotation = (Quat::from_rotation_y(step()) * place.rotation).normalize();
-    Placement { position, rotation, scale: place.scale }
 }
 
 #[test]

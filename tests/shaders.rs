@@ -2,7 +2,7 @@
 
 mod common;
 
-use common::{library, skip};
+use common::{library, skip, usual_permutation};
 use shadow_fields::bake::assemble::Assemble;
 use shadow_fields::bake::capture::Capture;
 use shadow_fields::bake::project::Project;
@@ -15,7 +15,7 @@ use shadow_fields::draw::grid::DrawGrid;
 use shadow_fields::draw::pixel_light::{LightImages, Receiver, Way};
 use shadow_fields::draw::smooth::Smooth;
 use shadow_fields::draw::triangles::{Detail, DrawTriangles, Form, Look};
-use shadow_fields::field::{FieldKind, Lattice, Storage};
+use shadow_fields::field::{FieldKind, Storage};
 use shadow_fields::gloss::gloss_row;
 use shadow_fields::lists::skip::Skip;
 use shadow_fields::merge::variant::{MergePermutation, Reads, VARIANTS, Variant};
@@ -156,25 +156,6 @@ fn measuring() -> Vec<ShaderPermutation> {
     (0..4).map(rate).collect()
 }
 
-fn lattice(text: &str) -> Lattice {
-    text.parse().unwrap()
-}
-
-fn usual_permutation() -> MergePermutation {
-    MergePermutation {
-        variant: VARIANTS[0],
-        bands: 4,
-        storage: Storage::F16,
-        lattice: Lattice { inner: 1.02, ..Lattice::default() },
-        skip: Skip::ALL,
-        lights: true,
-        sheets: true,
-        volume: false,
-        gloss: false,
-        entity_limit: 48,
-    }
-}
-
 /// A usual permutation, everything that differs from it in one choice, and a few far from it.
 fn merging() -> Vec<ShaderPermutation> {
     let usual = usual_permutation();
@@ -188,39 +169,23 @@ fn merging() -> Vec<ShaderPermutation> {
         permutations.extend([Storage::F16, Storage::F32].map(|storage| MergePermutation { variant, storage, ..usual }));
         permutations.push(MergePermutation { variant, storage: Storage::F32, bands: 3, skip: Skip::NONE, ..usual });
     }
-    permutations.push(MergePermutation { lattice: lattice("cube:1x1,inner=1.02"), ..usual });
+    permutations.push(MergePermutation { lattice: "cube:1x1,inner=1.02".parse().unwrap(), ..usual });
     permutations.push(MergePermutation { lights: false, ..usual });
     permutations.push(MergePermutation { sheets: false, ..usual });
     permutations.push(MergePermutation { volume: true, ..usual });
     permutations.push(MergePermutation { gloss: true, ..usual });
-    permutations.push(MergePermutation {
-        variant: Variant::named("texel-shifted").unwrap(),
-        lattice: lattice("cube:8x3"),
-        ..usual
-    });
+    let variant = Variant::named("texel-shifted").unwrap();
+    permutations.push(MergePermutation { variant, lattice: "cube:8x3".parse().unwrap(), ..usual });
     permutations.iter().map(MergePermutation::row).collect()
 }
 
-/// What spirv-val says of the words: `Err` with its complaint.
-fn validate(words: &[u32]) -> Result<(), String> {
-    let file = tempfile::NamedTempFile::new().unwrap();
-    std::fs::write(file.path(), bytemuck::cast_slice(words)).unwrap();
-    let output = Command::new("spirv-val").args(["--target-env", "vulkan1.3"]).arg(file.path()).output().unwrap();
-    let said = format!("{}{}", String::from_utf8_lossy(&output.stdout), String::from_utf8_lossy(&output.stderr));
-    if output.status.success() { Ok(()) } else { Err(said) }
-}
-
-fn has_validator() -> bool {
-    let found = Command::new("spirv-val").arg("--version").output().is_ok_and(|output| output.status.success());
-    if !found {
+/// Compiles every row and lets spirv-val judge what comes out, each different row once.
+fn check(rows: Vec<ShaderPermutation>) {
+    let validator = || Command::new("spirv-val");
+    let has_validator = validator().arg("--version").output().is_ok_and(|output| output.status.success());
+    if !has_validator {
         skip("spirv-val is not on the path (Debian's package is spirv-tools)");
     }
-    found
-}
-
-/// Compiles every row and validates what comes out, each different row once.
-fn check(rows: Vec<ShaderPermutation>) {
-    let has_validator = has_validator();
     let mut done: Vec<ShaderPermutation> = Vec::new();
     for row in rows {
         if done.contains(&row) {
@@ -228,7 +193,10 @@ fn check(rows: Vec<ShaderPermutation>) {
         }
         let shader = library().shader(&row).unwrap_or_else(|error| panic!("{row:?}: {error}"));
         if has_validator {
-            validate(&shader.spirv).unwrap_or_else(|error| panic!("{row:?}: {error}"));
+            let file = tempfile::NamedTempFile::new().unwrap();
+            std::fs::write(file.path(), bytemuck::cast_slice(&shader.spirv)).unwrap();
+            let output = validator().args(["--target-env", "vulkan1.3"]).arg(file.path()).output().unwrap();
+            assert!(output.status.success(), "{row:?}: {output:?}");
         }
         done.push(row);
     }

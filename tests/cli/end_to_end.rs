@@ -1,8 +1,12 @@
 //! What commands write, where, and that it is what it should be.
 
-use crate::cli::{Folder, SMALL, cache, finish, names};
+use crate::cli::{Folder, SMALL, cache, finish};
+use crate::common::names;
+use glam::DVec3;
 use serde_json::{Value, json};
+use shadow_fields::asset::picture::srgb_from_linear;
 use shadow_fields::scene::Scene;
+use shadow_fields::sh::lobe::cap;
 use std::path::Path;
 
 const SCENE: &str = "assets/scenes/sphere_over_plane.toml";
@@ -26,8 +30,7 @@ fn assert_encodes(png: &image::RgbImage, exr: &image::Rgb32FImage, gain: f32) {
             .flat_map(|y| (x.saturating_sub(1)..(x + 2).min(96)).map(move |x| (x, y)));
         if around.flat_map(|(x, y)| exr.get_pixel(x, y).0).all(|c| gain * c < 0.95) {
             for (shown, linear) in p.0.iter().zip(linear.map(|c| gain * c)) {
-                let srgb =
-                    255.0 * if linear <= 0.0031308 { 12.92 * linear } else { 1.055 * linear.powf(1.0 / 2.4) - 0.055 };
+                let srgb = 255.0 * srgb_from_linear(linear);
                 assert!((f32::from(*shown) - srgb).abs() <= 1.0, "pixel {x}, {y}: {shown} for {srgb}");
             }
             same += 1;
@@ -124,31 +127,9 @@ fn animations_are_one_file_or_numbered() {
     assert!(folder.read("half.exr") != folder.read("n_00.exr"));
 }
 
-/// Three bands of the cap that a sphere of radius 1 blocks, in closed form: coefficient (l, m) is sqrt(4 pi / (2 l +
-/// 1)) z_l times the basis function in the direction of the cap's middle, where z_l is the zonal integral over a cap
-/// about +z.
-fn cap(distance: f64, [x, y, z]: [f64; 3]) -> [f64; 9] {
-    let pi = std::f64::consts::PI;
-    let c = (1.0 - distance.powi(-2)).sqrt();
-    let z_l = [pi.sqrt() * (1.0 - c), (0.75 * pi).sqrt() * (1.0 - c * c), (1.25 * pi).sqrt() * (c - c * c * c)];
-    let basis = [
-        [0.282_094_8, 0.0, 0.0, 0.0, 0.0],
-        [-0.488_602_5 * y, 0.488_602_5 * z, -0.488_602_5 * x, 0.0, 0.0],
-        [
-            1.092_548_4 * x * y,
-            -1.092_548_4 * y * z,
-            0.315_391_6 * (3.0 * z * z - 1.0),
-            -1.092_548_4 * x * z,
-            0.546_274_2 * (x * x - y * y),
-        ],
-    ];
-    let mut out = [0.0; 9];
-    for l in 0..3 {
-        for m in 0..=2 * l {
-            out[l * l + m] = (4.0 * pi / (2.0 * l as f64 + 1.0)).sqrt() * z_l[l] * basis[l][m];
-        }
-    }
-    out
+/// What a sphere of radius 1 blocks towards `direction`, seen from a distance.
+fn blocked_part(distance: f64, direction: DVec3) -> Vec<f64> {
+    cap(4, direction, distance.recip().asin())
 }
 
 #[test]
@@ -170,8 +151,8 @@ fn bake_and_inspect_a_sphere() {
     assert_eq!((&result["at"]["position_m"], &result["header"]["kind"]), (&json!(at), &json!("occlusion")));
     let blocked: Vec<f64> = result["at"]["blocked"].as_array().unwrap().iter().map(|c| c.as_f64().unwrap()).collect();
     assert_eq!(blocked.len(), 16);
-    let distance = at.iter().map(|c| c * c).sum::<f64>().sqrt();
-    let expected = cap(distance / 0.5, at.map(|c| -c / distance));
+    let distance = DVec3::from(at).length();
+    let expected = blocked_part(distance / 0.5, -DVec3::from(at) / distance);
     let norm = expected.iter().map(|c| c * c).sum::<f64>().sqrt();
     let error = expected.iter().zip(&blocked).map(|(e, b)| (e - b).powi(2)).sum::<f64>().sqrt() / norm;
     // Faces of 32 px and shells in coarse steps: some percent of the blocked part.
@@ -191,7 +172,7 @@ fn bake_and_inspect_a_sphere() {
     let mean = |channel: usize| result["at"]["radiance"][channel][0].as_f64().unwrap();
     assert!((mean(0) / mean(1) - 2.0).abs() < 1e-3 && (mean(1) / mean(2) - 4.0).abs() < 1e-3, "{result}");
     // A cap of cos c and radiance 4 has 4 sqrt(pi) (1 - c) in band 0; 32 px see it within some percent.
-    let expected = 4.0 * cap(4.0, [0.0, -1.0, 0.0])[0];
+    let expected = 4.0 * blocked_part(4.0, DVec3::NEG_Y)[0];
     assert!((mean(0) / expected - 1.0).abs() < 0.08, "{} for {expected}", mean(0));
     assert_eq!(folder.names(), ["ball.obj", "f.sf", "r.sf", "sheet.png"]);
 }

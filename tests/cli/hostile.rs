@@ -2,14 +2,13 @@
 //! and ends with the exit code that the reason has.
 #![cfg(unix)]
 
-use crate::cli::{COARSE, Folder, finish, limited, without_drivers};
+use crate::cli::{COARSE, Folder, TRIANGLE, finish, limited, without_drivers};
 use crate::common;
 use shadow_fields::error::is_deceptive;
 use std::ffi::OsStr;
 use std::os::unix::ffi::OsStrExt;
 use std::process::Command;
 
-const TRIANGLE: &str = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n";
 const BAKE: &str = "bake m.obj --lattice cube:2x3 --face-px 4";
 const RENDER: &str = "render sphere_over_plane --size 8x8 --lattice cube:2x3 --face-px 4";
 

@@ -4,9 +4,9 @@
 //! The variable SHADOW_FIELDS_KILLS says how many rounds there are for each number of processes; without it there are 2.
 #![cfg(unix)]
 
-use crate::cli::{bare, finish, has_device, limited, names};
-use crate::common::{Running, report};
-use crate::room;
+use crate::cli::{bare, finish, has_device, limited};
+use crate::common::{Running, names, report};
+use crate::{model, room};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
@@ -14,12 +14,6 @@ use std::sync::OnceLock;
 use std::time::{Duration, Instant};
 
 const MESH: &str = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 1 4 3\n";
-
-/// One triangle.
-const MODEL: &str = r#"{ "asset": { "version": "2.0" }, "scene": 0, "scenes": [{ "nodes": [0] }], "nodes": [{ "mesh": 0 }],
-"meshes": [{ "primitives": [{ "attributes": { "POSITION": 0 } }] }], "bufferViews": [{ "buffer": 0, "byteLength": 36 }],
-"accessors": [{ "bufferView": 0, "componentType": 5126, "count": 3, "type": "VEC3", "min": [0, 0, 0], "max": [1, 1, 0] }],
-"buffers": [{ "byteLength": 36, "uri": "data:application/octet-stream;base64,AAAAAAAAAAAAAAAAAACAPwAAAAAAAAAAAAAAAAAAgD8AAAAA" }] }"#;
 
 /// Every kind of command that writes, and what it writes. Those whose files hold times, `bench` and `profile`, write
 /// them likewise; `farm` has tests of its own. What the first one writes is an input of
@@ -48,7 +42,7 @@ fn place(inside: &Path, name: &str) -> PathBuf {
     let folder = inside.join(name);
     room::write(&folder, [24, 16], "motion = [{ spin = { period_s = 3 } }]");
     std::fs::write(folder.join("m.obj"), MESH).unwrap();
-    std::fs::write(folder.join("t.gltf"), MODEL).unwrap();
+    model::robot().write_embedded(&folder, "t");
     folder
 }
 

@@ -10,6 +10,8 @@ mod compare;
 mod end_to_end;
 mod hostile;
 mod kills;
+#[path = "../common/model.rs"]
+mod model;
 mod outputs;
 mod profile;
 #[path = "../common/room.rs"]

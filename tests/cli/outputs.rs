@@ -2,16 +2,14 @@
 //! waited for.
 #![cfg(unix)]
 
-use crate::cli::{Folder, Ran, SMALL, finish, has_device, limited, without_drivers};
+use crate::cli::{Folder, Ran, SMALL, TRIANGLE, finish, has_device, limited, without_drivers};
 use shadow_fields::asset::picture::write_png;
 use std::os::unix::fs::{PermissionsExt, symlink};
-use std::process::{Command, Stdio};
-use std::time::{Duration, Instant};
+use std::process::Command;
 
 const SCENE: &str = "[camera]\neye = [0, 1, 5]\ntarget = [0, 0, 0]\n[environment]\nimage = { file = \"sky_0003.png\" }\n\
     [[mesh]]\nname = \"a\"\nfile = \"tri.obj\"\n[[mesh]]\nname = \"b\"\nfile = \"model.gltf\"\n\
     [[entity]]\nmesh = \"a\"\n[[entity]]\nmesh = \"b\"\n";
-const TRIANGLE: &str = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n";
 const MODEL: &str = r#"{
     "asset": { "version": "2.0" }, "scene": 0, "scenes": [{ "nodes": [0] }], "nodes": [{ "mesh": 0 }],
     "meshes": [{ "primitives": [{ "attributes": { "POSITION": 0 }, "material": 0 }] }],
@@ -165,20 +163,9 @@ fn a_late_failure_tells_what_is_written() {
     assert!(ran.stderr.trim_end().ends_with("already written: o.png"), "{}", ran.stderr);
 }
 
-/// Runs a command that must end within a minute.
-fn ended(command: &mut Command, what: &str) -> Ran {
-    let mut child = command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
-    let start = Instant::now();
-    while child.try_wait().unwrap().is_none() {
-        if start.elapsed() > Duration::from_secs(60) {
-            child.kill().unwrap();
-            panic!("{what} waits without end");
-        }
-        std::thread::sleep(Duration::from_millis(10));
-    }
-    let output = child.wait_with_output().unwrap();
-    let text = |bytes| String::from_utf8(bytes).unwrap();
-    Ran { code: output.status.code().unwrap(), stdout: text(output.stdout), stderr: text(output.stderr) }
+/// Runs a command, which ends with code 124 where it waits without end.
+fn ended(command: &Command) -> Ran {
+    finish(&mut limited(command, "set -- timeout 60 \"$@\""))
 }
 
 #[test]
@@ -212,14 +199,14 @@ fn inputs_that_are_no_files_are_refused_and_not_waited_for() {
         ("bake /dev/zero -o f.sf", "/dev/zero"),
         ("inspect /dev/zero", "/dev/zero"),
     ] {
-        let ran = ended(&mut folder.command(line), line);
+        let ran = ended(&folder.command(line));
         assert_eq!((ran.code, ran.stderr.lines().count()), (4, 1), "{line}: {}", ran.stderr);
         assert!(ran.stderr.contains(&format!("{file}: ")), "{line}: {}", ran.stderr);
     }
     drop(socket);
     if has_device() {
         let line = "bake tri.obj -o f.sf --face-px 4 --lattice cube:1x1 --shader-dir .";
-        let ran = ended(&mut folder.command(line), line);
+        let ran = ended(&folder.command(line));
         assert!(ran.code == 4 && ran.stderr.contains("project.comp: cannot be read"), "{} {}", ran.code, ran.stderr);
     }
 }
@@ -231,7 +218,7 @@ fn pipes_of_a_shell_are_read() {
     for script in ["\"$0\" compare <(sleep 0.2; cat a.png) b.png", "cat a.png | \"$0\" compare /dev/stdin b.png"] {
         let mut bash = Command::new("bash");
         bash.current_dir(folder.path()).args(["-c", script, env!("CARGO_BIN_EXE_shadow-fields")]);
-        let ran = ended(&mut bash, script);
+        let ran = ended(&bash);
         assert_eq!(ran.code, 0, "{script}: {}", ran.stderr);
     }
 }

@@ -1,7 +1,7 @@
 //! What `profile` counts and prints. Nothing here is timed.
 
-use crate::cli::{Folder, finish, names};
-use crate::common::library;
+use crate::cli::{Folder, finish};
+use crate::common::{library, names};
 use serde_json::Value;
 use shadow_fields::gpu::census;
 use shadow_fields::shaders::ShaderPermutation;

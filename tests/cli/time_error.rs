@@ -60,28 +60,20 @@ fn unknown_cases_are_listed() {
 fn own_scene(light: &str) -> String {
     format!(
         r#"
-        [camera]
-        eye = [0, 2, 4]
-        target = [0, 0.3, 0]
-        [output]
-        time_s = 0.5
-        exposure_ev = -0.5
-        [[mesh]]
-        name = "floor"
-        plane = {{ size_m = 4, cells = 16 }}
-        [[mesh]]
-        name = "ring"
-        torus = {{ major_m = 0.5, minor_m = 0.15, segments = 24, sides = 8 }}
-        [[mesh]]
-        name = "ball"
-        sphere = {{ radius_m = 0.2, subdivisions = 2 }}
-        [[entity]]
-        mesh = "floor"
-        [[entity]]
-        mesh = "ring"
-        position = [0, 0.6, 0]
-        motion = [{{ spin = {{ axis = [1, 0, 0], period_s = 4 }} }}]
-        {light}"#
+camera = {{ eye = [0, 2, 4], target = [0, 0.3, 0] }}
+output = {{ time_s = 0.5, exposure_ev = -0.5 }}
+mesh = [
+    {{ name = "floor", plane = {{ size_m = 4, cells = 16 }} }},
+    {{ name = "ring", torus = {{ major_m = 0.5, minor_m = 0.15, segments = 24, sides = 8 }} }},
+    {{ name = "ball", sphere = {{ radius_m = 0.2, subdivisions = 2 }} }},
+]
+[[entity]]
+mesh = "floor"
+[[entity]]
+mesh = "ring"
+position = [0, 0.6, 0]
+motion = [{{ spin = {{ axis = [1, 0, 0], period_s = 4 }} }}]
+{light}"#
     )
 }
 
@@ -129,7 +121,7 @@ fn a_scene_of_ones_own() {
 fn a_scene_that_cannot_be_judged_says_why() {
     let folder = Folder::new();
     let buried = LIGHT.replace("2, 0.3", "-2, 0.3");
-    let unlit = own_scene(LIGHT).replace("mesh = \"floor\"\n        [[", "mesh = \"floor\"\nreceives = false\n[[");
+    let unlit = own_scene(LIGHT).replace("mesh = \"floor\"\n", "mesh = \"floor\"\nreceives = false\n");
     let unlit = unlit.replace("position = [0, 0.6, 0]", "receives = false");
     let scenes = [
         ("torn.toml", "[camera]\neye = [0, 2".to_owned(), "torn.toml:2"),

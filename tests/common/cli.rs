@@ -2,7 +2,7 @@
 
 #![allow(dead_code)] // every test binary uses its own part
 
-use super::common;
+use super::common::{self, names};
 use serde_json::Value;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -14,6 +14,9 @@ use std::time::SystemTime;
 pub const COARSE: &str = "--lattice cube:4x3 --face-px 16";
 /// Options that make bakes and pictures small.
 pub const SMALL: &str = "--lattice cube:4x3 --face-px 16 --size 96x64";
+
+/// A mesh of one triangle.
+pub const TRIANGLE: &str = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n";
 
 /// What a run left behind.
 pub struct Ran {
@@ -52,21 +55,6 @@ pub fn finish(command: &mut Command) -> Ran {
     let Output { status, stdout, stderr } = command.output().unwrap();
     let text = |bytes| String::from_utf8(bytes).expect("what the program says is UTF-8");
     Ran { code: status.code().expect("it ended by itself"), stdout: text(stdout), stderr: text(stderr) }
-}
-
-/// Runs the program with the words of a line, which must succeed.
-pub fn good(folder: &Path, line: &str) -> Ran {
-    let ran = finish(&mut command(folder, line));
-    assert_eq!(ran.code, 0, "{line}: {}", ran.stderr);
-    ran
-}
-
-/// Names in a folder, sorted.
-pub fn names(folder: &Path) -> Vec<String> {
-    let entries = std::fs::read_dir(folder).unwrap();
-    let mut names: Vec<_> = entries.map(|e| e.unwrap().file_name().into_string().unwrap()).collect();
-    names.sort();
-    names
 }
 
 /// Whether a device is there, as the program sees it.
@@ -157,8 +145,11 @@ impl Folder {
         finish(&mut self.command(line))
     }
 
+    /// Runs the program with the words of a line, which must succeed.
     pub fn good(&self, line: &str) -> Ran {
-        good(self.path(), line)
+        let ran = self.run(line);
+        assert_eq!(ran.code, 0, "{line}: {}", ran.stderr);
+        ran
     }
 
     /// What a good run prints as JSON.

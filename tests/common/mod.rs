@@ -1,5 +1,5 @@
-//! What the GPU tests share: one validated device a test binary, used by one test at a time, and helpers that read
-//! images back.
+//! What tests share: one validated device a test binary, used by one test at a time, with a cache of fields that lives as
+//! long as the binary, and helpers.
 //!
 //! With SHADOW_FIELDS_REQUIRE_DEVICE=1 a missing device, validation layer or tool fails the tests; without it they are
 //! skipped with a line on stderr.
@@ -8,16 +8,17 @@
 
 pub use shadow_fields::asset::generate;
 
-use bytemuck::Pod;
 use glam::Vec3;
 use shadow_fields::asset::Mesh;
-use shadow_fields::bake::Baker;
 use shadow_fields::bake::cache::Cache;
-use shadow_fields::bake::capture::{Capture, Slots};
-use shadow_fields::check;
+use shadow_fields::bake::{self, Baker};
+use shadow_fields::farm::{Film, Input, Plan};
+use shadow_fields::field::{Lattice, Storage};
 use shadow_fields::frame::{self, Frame};
 use shadow_fields::gpu::{Device, DeviceOptions, Validation};
-use shadow_fields::scene::Scene;
+use shadow_fields::lists::skip::Skip;
+use shadow_fields::merge::variant::{MergePermutation, VARIANTS};
+use shadow_fields::scene::{Placement, Scene};
 use shadow_fields::shaders::Library;
 use std::path::{Path, PathBuf};
 use std::process::Child;
@@ -39,6 +40,14 @@ pub fn skip(reason: &str) {
 #[allow(clippy::print_stderr)]
 pub fn report(line: &str) {
     eprintln!("{line}");
+}
+
+/// Names in a folder, sorted.
+pub fn names(folder: &Path) -> Vec<String> {
+    let entries = std::fs::read_dir(folder).unwrap();
+    let mut names: Vec<_> = entries.map(|e| e.unwrap().file_name().into_string().unwrap()).collect();
+    names.sort();
+    names
 }
 
 /// A program that is ended with the test.
@@ -104,20 +113,56 @@ impl Gpu {
         Baker::new(&self.device, &self.library)
     }
 
-    /// A scene on the shared device, baked anew.
+    /// A scene on the shared device, its fields baked.
     pub fn frame(&self, scene: &Scene, options: frame::Options) -> Frame {
-        Frame::new(&self.baker(), &Cache::new(None), scene, options, &|_, _, _| ()).unwrap()
+        self.frame_on(&self.baker(), scene, options)
     }
 
-    /// Captures the faces of a batch and brings the atlas to the host; `C` values of `T` a texel.
-    pub fn atlas<T: Pod>(&self, capture: &Capture, eyes: &[Vec3], slots: &[Slots]) -> Vec<T> {
-        check::capture::atlas(&self.device, capture, eyes, slots).unwrap()
+    /// The same on the device of another baker, by the fields that are baked already.
+    pub fn frame_on(&self, baker: &Baker, scene: &Scene, options: frame::Options) -> Frame {
+        // Emptied first: fields of an earlier build would hide what this one bakes.
+        static FIELDS: OnceLock<PathBuf> = OnceLock::new();
+        let fields = FIELDS.get_or_init(|| {
+            let name = format!("fields-{}", env!("CARGO_CRATE_NAME"));
+            let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join(name);
+            let _ = std::fs::remove_dir_all(&folder);
+            folder
+        });
+        Frame::new(baker, &Cache::new(Some(fields)), scene, options, &|_, _, _| ()).unwrap()
+    }
+
+    /// Radiosity of every entity's vertices in turn, red, green and blue.
+    pub fn light(&self, frame: &mut Frame, placements: &[Placement]) -> Vec<Vec<[f32; 3]>> {
+        frame.render(placements, None).unwrap();
+        (0..placements.len()).map(|entity| frame.radiosity(entity).unwrap()).collect()
+    }
+
+    /// What comes of recordings without the barrier of that index.
+    pub fn without_barrier<R>(&self, index: usize, record: impl FnOnce() -> R) -> R {
+        self.device.omit_barrier(Some(index));
+        let outcome = record();
+        self.device.omit_barrier(None);
+        outcome
     }
 }
 
 /// A scene from its text, which may name files of the program.
 pub fn parse(text: &str) -> Scene {
     Scene::parse(text, Path::new("test.toml"), &shadow_fields::asset::embedded::read).unwrap()
+}
+
+/// Meshes in one, each moved.
+pub fn joined(parts: &[(&Mesh, Vec3)]) -> Mesh {
+    let mut positions = Vec::new();
+    let mut normals = Vec::new();
+    let mut triangles = Vec::new();
+    for (part, by) in parts {
+        let first = positions.len() as u32;
+        positions.extend(part.positions.iter().map(|p| *p + *by));
+        normals.extend(&part.normals);
+        triangles.extend(part.triangles.iter().map(|t| t.map(|i| i + first)));
+    }
+    Mesh::new("joined", positions, normals, None, triangles).unwrap()
 }
 
 /// A mesh's places and triangles as OBJ text.
@@ -139,11 +184,39 @@ pub fn huge_png() -> Vec<u8> {
     png
 }
 
+/// The merge of usual scenes.
+pub fn usual_permutation() -> MergePermutation {
+    MergePermutation {
+        variant: VARIANTS[0],
+        bands: 4,
+        storage: Storage::F16,
+        lattice: Lattice { inner: 1.02, ..Lattice::default() },
+        skip: Skip::ALL,
+        lights: true,
+        sheets: true,
+        volume: false,
+        gloss: false,
+        entity_limit: 48,
+    }
+}
+
+/// A plan of two meshes and of two pictures, each a slice.
+pub fn plan() -> Plan {
+    let mut plan = Plan::new("a (b)".into(), "results".into(), bake::Options::default());
+    let input = |path: &str| Input { path: path.into(), hash: path.into() };
+    plan.add_meshes(["a.obj", "b.obj"].map(input).into(), 1);
+    let options = frame::Options::default();
+    let film =
+        Film { scene: input("s.toml"), pictures: "f_#.png".into(), options, exposure_ev: 0.0, first_s: 0.0, fps: 24 };
+    plan.add_film(film, 2, 1);
+    plan
+}
+
 /// Root mean square of what found numbers are off true ones by, relative to that of the true ones.
-pub fn relative_rms(found_and_true: impl IntoIterator<Item = (f64, f64)>) -> f64 {
-    let mut off = 0.0;
+pub fn relative_rms<T: Into<f64>>(found_and_true: impl IntoIterator<Item = (T, T)>) -> f64 {
+    let mut off = 0.0_f64;
     let mut whole = 0.0;
-    for (found, truth) in found_and_true {
+    for (found, truth) in found_and_true.into_iter().map(|(found, truth)| (found.into(), truth.into())) {
         off += (found - truth).powi(2);
         whole += truth * truth;
     }

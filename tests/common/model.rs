@@ -3,9 +3,12 @@
 
 #![allow(dead_code)] // every test binary uses its own part
 
+use super::common::{generate, joined};
 use base64::Engine as _;
+use glam::{DVec3, Vec3};
 use serde_json::{Value, json};
 use shadow_fields::Result;
+use shadow_fields::asset::Mesh;
 use shadow_fields::scene::{Scene, gltf};
 use std::path::{Path, PathBuf};
 
@@ -18,6 +21,7 @@ pub const U32: u32 = 5125;
 pub const F32: u32 = 5126;
 
 /// A model in the making. The JSON may be changed before it is written.
+#[derive(Clone)]
 pub struct Model {
     pub json: Value,
     pub bytes: Vec<u8>,
@@ -114,13 +118,17 @@ impl Model {
         self.push("materials", json!({ "pbrMetallicRoughness": pbr }))
     }
 
-    /// An indexed box between two corners, with a normal a face.
-    pub fn cuboid(&mut self, low: [f32; 3], high: [f32; 3], material: Option<usize>) -> usize {
-        let (positions, normals, indices) = cuboid(low, high);
-        let positions = self.positions(&positions);
-        let normals = self.floats(3, &normals);
-        let indices = self.indices(&indices);
+    /// A mesh of one primitive with positions, normals and indices.
+    pub fn shape(&mut self, mesh: &Mesh, material: Option<usize>) -> usize {
+        let positions = self.positions(bytemuck::cast_slice(&mesh.positions));
+        let normals = self.floats(3, bytemuck::cast_slice(&mesh.normals));
+        let indices = self.indices(&corners(mesh));
         self.mesh(json!({ "POSITION": positions, "NORMAL": normals }), Some(indices), material)
+    }
+
+    /// The same of a box between two corners.
+    pub fn cuboid(&mut self, low: [f32; 3], high: [f32; 3], material: Option<usize>) -> usize {
+        self.shape(&cuboid(low, high), material)
     }
 
     /// An animation channel of a node: times and numbers, `width` a value.
@@ -139,31 +147,48 @@ impl Model {
         json["channels"].as_array_mut().unwrap().push(channel);
     }
 
-    /// Adds a light that nodes name by its index.
-    pub fn light(&mut self, light: Value) -> usize {
+    /// Adds a light and returns the extensions of a node that holds it.
+    pub fn light(&mut self, light: Value) -> Value {
         if self.json["extensions"].is_null() {
             self.json["extensionsUsed"] = json!(["KHR_lights_punctual"]);
             self.json["extensions"] = json!({ "KHR_lights_punctual": { "lights": [] } });
         }
         let lights = self.json["extensions"]["KHR_lights_punctual"]["lights"].as_array_mut().unwrap();
         lights.push(light);
-        lights.len() - 1
+        json!({ "KHR_lights_punctual": { "light": lights.len() - 1 } })
     }
 
-    fn with_buffer(&self, uri: Option<String>) -> String {
+    /// A texture of a picture's bytes.
+    pub fn texture(&mut self, mime: &str, picture: &[u8]) -> usize {
+        let view = self.view(picture);
+        let image = self.push("images", json!({ "bufferView": view, "mimeType": mime }));
+        self.push("textures", json!({ "source": image }))
+    }
+
+    /// The JSON with its buffer.
+    pub fn whole(&self) -> Value {
         let mut json = self.json.clone();
         if !self.bytes.is_empty() {
-            json["buffers"] = json!([{ "byteLength": self.bytes.len() }]);
-            if let Some(uri) = uri {
-                json["buffers"][0]["uri"] = json!(uri);
+            if json["buffers"].is_null() {
+                json["buffers"] = json!([{}]);
             }
+            json["buffers"][0]["byteLength"] = json!(self.bytes.len());
         }
-        json.to_string()
+        json
+    }
+
+    /// Writes `NAME.gltf` into a folder, with its buffer at `uri`.
+    fn write_json(&self, folder: &Path, name: &str, uri: &str) -> PathBuf {
+        let mut json = self.whole();
+        json["buffers"][0]["uri"] = json!(uri);
+        let path = folder.join(format!("{name}.gltf"));
+        std::fs::write(&path, json.to_string()).unwrap();
+        path
     }
 
     /// The model as GLB.
     pub fn glb(&self) -> Vec<u8> {
-        glb(self.with_buffer(None).as_bytes(), &self.bytes)
+        glb(self.whole().to_string().as_bytes(), &self.bytes)
     }
 
     /// Writes `NAME.glb` into a folder.
@@ -176,19 +201,14 @@ impl Model {
     /// Writes `NAME.gltf` into a folder, with its buffer as base64.
     pub fn write_embedded(&self, folder: &Path, name: &str) -> PathBuf {
         let data = base64::engine::general_purpose::STANDARD.encode(&self.bytes);
-        let text = self.with_buffer(Some(format!("data:application/octet-stream;base64,{data}")));
-        let path = folder.join(format!("{name}.gltf"));
-        std::fs::write(&path, text).unwrap();
-        path
+        self.write_json(folder, name, &format!("data:application/octet-stream;base64,{data}"))
     }
 
     /// Writes `NAME.gltf` into a folder, with its buffer in a file beside it that `uri` names.
     pub fn write_beside(&self, folder: &Path, name: &str, uri: &str, file: &Path) -> PathBuf {
         std::fs::create_dir_all(file.parent().unwrap()).unwrap();
         std::fs::write(file, &self.bytes).unwrap();
-        let path = folder.join(format!("{name}.gltf"));
-        std::fs::write(&path, self.with_buffer(Some(uri.to_owned()))).unwrap();
-        path
+        self.write_json(folder, name, uri)
     }
 }
 
@@ -233,9 +253,8 @@ pub fn room() -> Model {
     model.animate(0, box_, "rotation", "LINEAR", &[0., 1., 2.], &[0., 0., 0., 1., 0., half, 0., half, 0., 1., 0., 0.]);
     let mesh = model.cuboid([-0.1; 3], [0.1; 3], Some(glow));
     model.node(json!({ "name": "ember", "mesh": mesh, "translation": [1.2, 0.6, 0.8] }));
-    let light = model.light(json!({ "type": "point", "color": [0.6, 0.8, 1], "intensity": 20 }));
-    let extension = json!({ "KHR_lights_punctual": { "light": light } });
-    model.node(json!({ "name": "lamp", "translation": [-1.5, 2, 1], "extensions": extension }));
+    let lamp = model.light(json!({ "type": "point", "color": [0.6, 0.8, 1], "intensity": 20 }));
+    model.node(json!({ "name": "lamp", "translation": [-1.5, 2, 1], "extensions": lamp }));
     let camera = json!({ "type": "perspective", "perspective": { "yfov": 0.7, "znear": 0.1, "aspectRatio": 1.5 } });
     let camera = model.push("cameras", camera);
     model.node(json!({ "camera": camera, "translation": [0, 1.2, 6], "rotation": [-0.05, 0, 0, 0.99875] }));
@@ -244,34 +263,15 @@ pub fn room() -> Model {
 
 /// A board on two legs, one primitive, and specks beside them that have little area.
 pub fn bench(material: Value) -> Model {
+    let board = cuboid([-1.0, 0.5, -0.3], [1.0, 0.6, 0.3]);
+    let leg = cuboid([-0.05, 0.0, -0.2], [0.05, 0.5, 0.2]);
+    let speck = vec![Vec3::ZERO, 0.01 * Vec3::X, 0.01 * Vec3::NEG_Z];
+    let speck = Mesh::new("speck", speck, Vec::new(), None, vec![[0, 1, 2]]).unwrap();
+    let mut parts = vec![(&board, Vec3::ZERO), (&leg, -0.85 * Vec3::X), (&leg, 0.85 * Vec3::X)];
+    parts.extend([0.0, 1.0, 2.0].map(|x| (&speck, Vec3::new(x, 1.0, 0.0))));
     let mut model = Model::default();
-    let boxes = [
-        ([-1.0, 0.5, -0.3], [1.0, 0.6, 0.3]),
-        ([-0.9, 0.0, -0.2], [-0.8, 0.5, 0.2]),
-        ([0.8, 0.0, -0.2], [0.9, 0.5, 0.2]),
-    ];
-    let mut positions = Vec::new();
-    let mut normals = Vec::new();
-    let mut indices = Vec::new();
-    for (low, high) in boxes {
-        let (own, along, corners) = cuboid(low, high);
-        let first = positions.len() as u16 / 3;
-        indices.extend(corners.iter().map(|corner| first + corner));
-        positions.extend(own);
-        normals.extend(along);
-    }
-    for speck in 0..3 {
-        let first = positions.len() as u16 / 3;
-        let x = speck as f32;
-        positions.extend([x, 1.0, 0.0, x + 0.01, 1.0, 0.0, x, 1.0, -0.01]);
-        normals.extend([0.0, 1.0, 0.0].repeat(3));
-        indices.extend([first, first + 1, first + 2]);
-    }
     let material = model.push("materials", material);
-    let positions = model.positions(&positions);
-    let attributes = json!({ "POSITION": positions, "NORMAL": model.floats(3, &normals) });
-    let indices = model.indices(&indices);
-    let mesh = model.mesh(attributes, Some(indices), Some(material));
+    let mesh = model.shape(&joined(&parts), Some(material));
     model.node(json!({ "name": "bench", "mesh": mesh }));
     model
 }
@@ -290,9 +290,8 @@ pub fn robot() -> Model {
         outer = Some(node);
     }
     for x in [-2, 2] {
-        let light = model.light(json!({ "type": "point", "intensity": 20 }));
-        let extension = json!({ "KHR_lights_punctual": { "light": light } });
-        model.node(json!({ "translation": [x, 3, 1], "extensions": extension }));
+        let lamp = model.light(json!({ "type": "point", "intensity": 20 }));
+        model.node(json!({ "translation": [x, 3, 1], "extensions": lamp }));
     }
     model
 }
@@ -315,28 +314,25 @@ pub fn glb(json: &[u8], binary: &[u8]) -> Vec<u8> {
     out
 }
 
-/// Positions, normals and indices of a box.
-pub fn cuboid(low: [f32; 3], high: [f32; 3]) -> (Vec<f32>, Vec<f32>, Vec<u16>) {
-    let mut positions = Vec::new();
-    let mut normals = Vec::new();
-    let mut indices = Vec::new();
-    for axis in 0..3 {
-        let (u, v) = ((axis + 1) % 3, (axis + 2) % 3);
-        for (side, sign) in [(low, -1.0), (high, 1.0)] {
-            let first = (positions.len() / 3) as u16;
-            for (a, b) in [(0, 0), (1, 0), (1, 1), (0, 1)] {
-                let mut corner = [0.0; 3];
-                corner[axis] = side[axis];
-                corner[u] = [low[u], high[u]][a];
-                corner[v] = [low[v], high[v]][b];
-                positions.extend(corner);
-                let mut normal = [0.0; 3];
-                normal[axis] = sign;
-                normals.extend(normal);
-            }
-            let face = if sign > 0.0 { [0, 1, 2, 0, 2, 3] } else { [0, 2, 1, 0, 3, 2] };
-            indices.extend(face.map(|i| first + i));
-        }
-    }
-    (positions, normals, indices)
+/// A box between two corners.
+pub fn cuboid(low: [f32; 3], high: [f32; 3]) -> Mesh {
+    let [low, high] = [low, high].map(Vec3::from);
+    joined(&[(&generate::cuboid(high - low, 1), (low + high) / 2.0)])
+}
+
+/// The vertices of triangles one after another.
+pub fn corners(mesh: &Mesh) -> Vec<u16> {
+    mesh.triangles.as_flattened().iter().map(|vertex| *vertex as u16).collect()
+}
+
+/// Vertices of an entity in the world at a time.
+pub fn world(import: &gltf::Import, entity: usize, time_s: f64) -> Vec<DVec3> {
+    let data = &import.data.entities[entity];
+    let mesh = import.data.meshes.iter().position(|mesh| mesh.name == data.mesh).unwrap();
+    let at = data.at(time_s);
+    import.meshes[mesh].positions.iter().map(|p| at.point(p.as_dvec3())).collect()
+}
+
+pub fn near(a: DVec3, b: DVec3) -> bool {
+    (a - b).length() < 1e-5 * (1.0 + b.length())
 }

@@ -2,58 +2,16 @@
 
 #![allow(dead_code)] // every test binary uses its own part
 
-use super::common::{Gpu, gpu, parse};
-use glam::{Quat, Vec3};
-use shadow_fields::bake::Baker;
-use shadow_fields::bake::cache::Cache;
-use shadow_fields::frame::{self, Frame};
+pub use super::common::{Gpu as Stage, gpu as stage};
+
+use super::common::parse;
+use glam::{EulerRot, Quat, Vec3};
+use shadow_fields::frame;
 use shadow_fields::scene::{Placement, Scene};
-use std::path::{Path, PathBuf};
-use std::sync::OnceLock;
-
-/// The device with a baker and a cache of fields that lives as long as the test binary.
-pub struct Stage {
-    baker: Baker,
-    cache: Cache,
-    /// Last, so that the validation layer is asked once everything else is gone.
-    pub gpu: Gpu,
-}
-
-/// Waits for this test's turn with the device; `None` when the test is to be skipped.
-pub fn stage() -> Option<Stage> {
-    // Emptied first: fields of an earlier build would hide what this one bakes.
-    static FIELDS: OnceLock<PathBuf> = OnceLock::new();
-    let fields = FIELDS.get_or_init(|| {
-        let name = format!("fields-{}", env!("CARGO_CRATE_NAME"));
-        let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join(name);
-        let _ = std::fs::remove_dir_all(&folder);
-        folder
-    });
-    let gpu = gpu()?;
-    Some(Stage { baker: Baker::new(&gpu.device, &gpu.library), cache: Cache::new(Some(fields)), gpu })
-}
 
 /// Few samples of few texels in f32: quick, and all that a comparison with a twin needs. The variant is pinned.
 pub fn small() -> frame::Options {
     shadow_fields::check::merge::options()
-}
-
-impl Stage {
-    /// A scene on the device, its fields baked.
-    pub fn frame(&self, scene: &Scene, options: frame::Options) -> Frame {
-        self.frame_on(&self.baker, scene, options)
-    }
-
-    /// The same on the device of another baker, by the fields that are baked already.
-    pub fn frame_on(&self, baker: &Baker, scene: &Scene, options: frame::Options) -> Frame {
-        Frame::new(baker, &self.cache, scene, options, &|_, _, _| ()).unwrap()
-    }
-
-    /// Radiosity of every entity's vertices in turn, red, green and blue.
-    pub fn light(&self, frame: &mut Frame, placements: &[Placement]) -> Vec<Vec<[f32; 3]>> {
-        frame.render(placements, None).unwrap();
-        (0..placements.len()).map(|entity| frame.radiosity(entity).unwrap()).collect()
-    }
 }
 
 /// A scene from the text of its meshes, entities and sky; a camera is added.
@@ -64,6 +22,14 @@ pub fn scene(text: &str) -> Scene {
 /// An object upright at a place in its own size.
 pub fn at(x: f32, y: f32, z: f32) -> Placement {
     Placement { position: Vec3::new(x, y, z), rotation: Quat::IDENTITY, scale: 1.0 }
+}
+
+/// The same a little further on, by at most `reach_m` level and a fifth of that upwards, and turned.
+pub fn jostled(place: &Placement, rng: &mut fastrand::Rng, reach_m: f32) -> Placement {
+    let mut step = || (rng.f32() - 0.5) * 2.0 * reach_m;
+    let position = place.position + Vec3::new(step(), 0.2 * step(), step());
+    let rotation = (Quat::from_euler(EulerRot::XYZ, step(), step(), step()) * place.rotation).normalize();
+    Placement { position, rotation, scale: place.scale }
 }
 
 /// Largest of all differences, and the largest magnitude of `b`.

@@ -24,10 +24,6 @@ fn search_path() -> String {
     format!("{}:{}:/usr/sbin", own.display(), std::env::var("PATH").unwrap())
 }
 
-fn has_dask() -> bool {
-    engine("Dask", succeeds("python3", &["-c", "import distributed"]))
-}
-
 fn succeeds(program: &str, arguments: &[&str]) -> bool {
     let mut command = Command::new("env");
     command.arg(program).args(arguments).env("PATH", search_path());
@@ -36,7 +32,7 @@ fn succeeds(program: &str, arguments: &[&str]) -> bool {
 
 #[test]
 fn dask_runs_slices_in_two_workers() {
-    if !has_dask() {
+    if !engine("Dask", succeeds("python3", &["-c", "import distributed"])) {
         return;
     }
     let Some(farm) = Farm::planned() else { return };

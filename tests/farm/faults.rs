@@ -54,27 +54,6 @@ fn a_slice_that_cannot_be_written_fails() {
     assert!(farm.collected() == whole().files);
 }
 
-/// Process ids of all that descend from a process, and its own.
-fn descendants(parent: u32) -> Vec<u32> {
-    let parents: Vec<(u32, u32)> = std::fs::read_dir("/proc")
-        .unwrap()
-        .filter_map(|entry| {
-            let entry = entry.ok()?;
-            let id: u32 = entry.file_name().to_str()?.parse().ok()?;
-            let stat = std::fs::read_to_string(entry.path().join("stat")).ok()?;
-            Some((id, stat.rsplit_once(") ")?.1.split(' ').nth(1)?.parse().ok()?))
-        })
-        .collect();
-    let mut all = vec![parent];
-    let mut next = 0;
-    while next < all.len() {
-        let parent = all[next];
-        all.extend(parents.iter().filter(|(_, of)| *of == parent).map(|(id, _)| *id));
-        next += 1;
-    }
-    all
-}
-
 /// Slices, workers and submitters are killed at random moments. Afterwards what is there is whole, and the rest is
 /// done.
 #[test]
@@ -95,7 +74,8 @@ fn kills_lose_at_most_the_slice() {
         };
         let mut process = command.stdout(std::process::Stdio::null()).spawn().unwrap();
         std::thread::sleep(std::time::Duration::from_millis(random.u64(50..1500)));
-        let all = descendants(process.id());
+        let words = farm.path().as_os_str().as_encoded_bytes();
+        let all = [vec![process.id()], processes(words)].concat();
         // The submitter alone, any one of its processes, or all of them as when a machine loses power.
         let chosen = match random.usize(0..3) {
             0 => vec![all[0]],
@@ -110,7 +90,7 @@ fn kills_lose_at_most_the_slice() {
         process.wait().unwrap();
         // Slices of a submitter that was killed end too.
         let start = std::time::Instant::now();
-        while !processes(farm.path().as_os_str().as_encoded_bytes()).is_empty() {
+        while !processes(words).is_empty() {
             assert!(start.elapsed().as_secs() < 60, "slices of a killed submitter end");
             std::thread::sleep(std::time::Duration::from_millis(20));
         }

@@ -1,11 +1,11 @@
 //! What is refused before any work is done: other programs, devices and inputs, and works and options that make no
 //! plan.
 
-use super::{DRAFT, Farm};
+use super::{DRAFT, Farm, common};
 use serde_json::{Value, json};
+use shadow_fields::farm::Plan;
 use shadow_fields::farm::results::{self, SliceResult};
-use shadow_fields::farm::{Film, Input, Plan};
-use shadow_fields::{bake, field::file, frame};
+use shadow_fields::field::file;
 
 #[test]
 fn other_programs_devices_and_inputs_are_refused_with_both_names() {
@@ -112,22 +112,10 @@ fn a_plan_replaces_no_other_file() {
     assert!(farm.plan("other.json")["slices"].is_array());
 }
 
-/// A plan of two meshes and of two pictures.
-fn example() -> Plan {
-    let mut plan = Plan::new("a (b)".into(), "results".into(), bake::Options::default());
-    let input = |path: &str| Input { path: path.into(), hash: path.into() };
-    plan.add_meshes(["a.obj", "b.obj"].map(input).into(), 1);
-    let options = frame::Options::default();
-    let film =
-        Film { scene: input("s.toml"), pictures: "f_#.png".into(), options, exposure_ev: 0.0, first_s: 0.0, fps: 24 };
-    plan.add_film(film, 2, 1);
-    plan
-}
-
 /// Each thing that decides a result is part of its name.
 #[test]
 fn names_of_results_differ_where_anything_differs() {
-    let base = example();
+    let base = common::plan();
     let mut keys: Vec<String> = (0..4).map(|slice| base.key(slice)).collect();
     let edits: [(usize, fn(&mut Plan)); 9] = [
         (0, |p| p.plan_of.push('x')),
@@ -157,7 +145,7 @@ fn names_of_results_differ_where_anything_differs() {
 #[test]
 fn results_with_other_names_are_damaged() {
     let folder = tempfile::tempdir().unwrap();
-    let plan = Plan { folder: folder.path().to_owned(), ..example() };
+    let plan = Plan { folder: folder.path().to_owned(), ..common::plan() };
     let found = |key: &str, files: Value, payload: &[u8]| {
         file::write(&results::path(&plan, 0), *b"SHSLICE\n", &json!({ "key": key, "files": files }), payload).unwrap();
         results::find(&plan, 0)

@@ -22,12 +22,21 @@ pub fn run(folder: &Path) -> Result<()> {
     let device = Device::new(&options)?;
     let [width, height] = SIZE;
     let image = Image::new(&device, "window", ImageShape { format: FORMAT, width, height, samples: 1 })?;
+    let lattice = "cube:2x3".parse().expect("a lattice");
+    let frame = frame::Options {
+        bake: bake::Options { lattice, face_px: 4, ..Default::default() },
+        lights: Lights::Sharp,
+        shading: Some(Shading::Vertex),
+        size: SIZE,
+        antialias: Antialias::Outlines,
+        ..check::merge::options()
+    };
     let setup = Setup {
         device: device.clone(),
         options,
         library: Library { shader_dir: None, cache_dir: Some(cache_dir.clone()) },
         cache: Cache::new(Some(&cache_dir)),
-        frame: frame_options(),
+        frame,
         format: FORMAT,
         seed: 1,
         strict: false,
@@ -57,16 +66,4 @@ pub fn run(folder: &Path) -> Result<()> {
     drop(viewer);
     device.save_pipeline_cache();
     std::fs::write(folder.join("w.raw"), pixels.as_flattened()).map_err(|error| Error::Failed(error.to_string()))
-}
-
-fn frame_options() -> frame::Options {
-    let lattice = "cube:2x3".parse().expect("a lattice");
-    frame::Options {
-        bake: bake::Options { lattice, face_px: 4, ..Default::default() },
-        lights: Lights::Sharp,
-        shading: Some(Shading::Vertex),
-        size: SIZE,
-        antialias: Antialias::Outlines,
-        ..check::merge::options()
-    }
 }

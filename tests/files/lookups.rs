@@ -1,11 +1,11 @@
 //! Lookups of any field are continuous. The seed is fixed and printed (`--nocapture`); a place of a jump is shrunk and
 //! printed too.
 
-use crate::common;
-use common::report;
+use crate::common::{generate, report};
 use glam::DVec3;
 use proptest::prelude::*;
 use proptest::test_runner::{RngSeed, TestRunner};
+use shadow_fields::bake;
 use shadow_fields::bake::assemble::{Sources, twin};
 use shadow_fields::field::{FieldHeader, FieldKind, Fit, Lattice, ShadowField, Storage};
 
@@ -23,21 +23,9 @@ fn apart(a: &[f64], b: &[f64]) -> f64 {
 /// A field of random numbers, stored as a bake stores them.
 fn field(lattice: Lattice, seed: u64) -> ShadowField {
     let mut rng = fastrand::Rng::with_seed(seed);
-    let header = FieldHeader {
-        kind: FieldKind::Occlusion,
-        bands: 2,
-        storage: Storage::F32,
-        lattice,
-        face_px: 8,
-        level_texels: 0.0,
-        filled_samples: 0,
-        captured_samples: 0,
-        centre_m: [0.0; 3],
-        radius_m: 1.0,
-        radiance_scale: 1.0,
-        mesh: "random".into(),
-        mesh_hash: String::new(),
-    };
+    let options = bake::Options { bands: 2, storage: Storage::F32, ..Default::default() };
+    let header = bake::header(&generate::sphere(1.0, 0), FieldKind::Occlusion, &options);
+    let header = FieldHeader { lattice, ..header };
     let captured: Vec<f32> =
         (0..lattice.sample_count() as usize * header.sample_stride()).map(|_| rng.f32() - 0.5).collect();
     let none = vec![false; lattice.sample_count() as usize];

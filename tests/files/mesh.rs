@@ -1,6 +1,6 @@
 //! Meshes: generators against closed forms, derived properties, the enclosing sphere, and OBJ files.
 
-use crate::common::generate;
+use crate::common::{generate, joined};
 use std::f64::consts::{PI, TAU};
 use std::path::Path;
 
@@ -194,27 +194,19 @@ fn shape_survives_rotation_and_refuses_defects() {
     assert!(!rebuild(&bent, bent.triangles.clone()).is_flat());
 }
 
-/// Two meshes in one, the second moved.
-fn union(a: &Mesh, b: &Mesh, by: Vec3) -> Mesh {
-    let positions = a.positions.iter().copied().chain(b.positions.iter().map(|p| *p + by)).collect();
-    let normals = a.normals.iter().chain(&b.normals).copied().collect();
-    let first = a.positions.len() as u32;
-    let triangles = a.triangles.iter().copied().chain(b.triangles.iter().map(|t| t.map(|i| i + first))).collect();
-    Mesh::new("union", positions, normals, None, triangles).unwrap()
-}
-
 #[test]
 fn pieces_and_contacts() {
     let cube = cuboid(Vec3::ONE, 1);
-    let apart = union(&cube, &cube, Vec3::new(3.0, 0.0, 0.0));
+    let beside = |mesh: &Mesh, by: Vec3| joined(&[(mesh, Vec3::ZERO), (mesh, by)]);
+    let apart = beside(&cube, Vec3::X * 3.0);
     assert!(apart.is_closed() && !apart.is_convex() && apart.euler_characteristic() == 4);
     assert!(apart.is_solid() && sphere(1.0, 2).is_solid() && torus(1.0, 0.3, 12, 8).is_solid() && !pot().is_solid());
     let turned = cube.triangles.iter().map(|t| [t[0], t[2], t[1]]).collect();
     let wall = Mesh::new("wall", cube.positions.clone(), cube.normals.clone(), None, turned).unwrap();
-    let hollow = union(&cuboid(Vec3::splat(3.0), 1), &wall, Vec3::ZERO);
+    let hollow = joined(&[(&cuboid(Vec3::splat(3.0), 1), Vec3::ZERO), (&wall, Vec3::ZERO)]);
     assert!(hollow.is_closed() && !hollow.is_solid(), "a hollow in a box");
-    assert!(!union(&cube, &cube, Vec3::ONE).is_closed(), "two boxes that share one corner are no manifold");
-    assert!(!union(&cube, &cube, Vec3::new(1.0, 1.0, 0.0)).is_closed(), "nor are two that share an edge");
+    assert!(!beside(&cube, Vec3::ONE).is_closed(), "two boxes that share one corner are no manifold");
+    assert!(!beside(&cube, Vec3::new(1.0, 1.0, 0.0)).is_closed(), "nor are two that share an edge");
 }
 
 #[test]

@@ -1,15 +1,12 @@
 //! Pictures written and read back.
 
+use crate::common::names;
 use std::io::BufReader;
 use std::path::Path;
 
 use shadow_fields::asset::picture::{
     encode_srgb, linear_from_srgb, srgb_from_linear, write_apng, write_exr, write_png, write_whole,
 };
-
-fn files(folder: &Path) -> Vec<String> {
-    std::fs::read_dir(folder).unwrap().map(|e| e.unwrap().file_name().into_string().unwrap()).collect()
-}
 
 #[test]
 fn srgb_curve() {
@@ -36,7 +33,7 @@ fn png_reads_back() {
     let pixels: Vec<f32> = (0..5 * 3 * 3).map(|i| i as f32 / 20.0).collect();
     write_png(&path, 5, 3, &pixels, -1.0).unwrap();
     write_png(&path, 5, 3, &pixels, -1.0).unwrap();
-    assert_eq!(files(folder.path()), ["p.png"], "nothing else is left behind");
+    assert_eq!(names(folder.path()), ["p.png"], "nothing else is left behind");
     let mut reader = png::Decoder::new(BufReader::new(std::fs::File::open(&path).unwrap())).read_info().unwrap();
     let mut bytes = vec![0; reader.output_buffer_size().unwrap()];
     let info = reader.next_frame(&mut bytes).unwrap();
@@ -44,15 +41,7 @@ fn png_reads_back() {
         (info.width, info.height, info.color_type, info.bit_depth),
         (5, 3, png::ColorType::Rgb, png::BitDepth::Eight)
     );
-    let expected: Vec<u8> = pixels
-        .iter()
-        .map(|c| {
-            let x = (f64::from(*c) * 0.5).min(1.0);
-            let encoded = if x <= 0.0031308 { 12.92 * x } else { 1.055 * x.powf(1.0 / 2.4) - 0.055 };
-            (encoded * 255.0).round() as u8
-        })
-        .collect();
-    assert_eq!(bytes, expected);
+    assert_eq!(bytes, encode_srgb(&pixels, -1.0));
     let text = &reader.info().uncompressed_latin1_text;
     assert_eq!((text[0].keyword.as_str(), text[0].text.as_str()), ("Exposure", "-1 EV"));
     assert!(reader.info().srgb.is_some());
@@ -112,7 +101,7 @@ fn failure_leaves_what_was_there() {
     let message = error.unwrap_err().to_string();
     assert!(message.contains("p.png: cannot be written: no more"), "{message}");
     assert_eq!(std::fs::read(&path).unwrap(), before);
-    assert_eq!(files(folder.path()), ["p.png"]);
+    assert_eq!(names(folder.path()), ["p.png"]);
     for bad in [folder.path().join("none/p.png"), folder.path().to_owned()] {
         let error = write_png(&bad, 1, 1, &[0.5; 3], 0.0).unwrap_err();
         assert_eq!(error.exit_code(), 1);

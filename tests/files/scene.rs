@@ -1,16 +1,12 @@
 //! Scenes: the embedded ones, defaults, motion in closed form, and TOML there and back.
 
+use crate::common::parse;
 use std::path::Path;
 
 use glam::{Quat, Vec3};
-use shadow_fields::Result;
 use shadow_fields::asset::embedded;
 use shadow_fields::field::sub_light::LampFace;
 use shadow_fields::scene::{Data, LightMethod, Lights, Placement, Scene};
-
-fn nothing(path: &Path) -> Result<Vec<u8>> {
-    Err(shadow_fields::Error::input(path, "this test has no files"))
-}
 
 /// A scene of one ball with the given lines in its entity.
 fn ball(lines: &str) -> Scene {
@@ -18,7 +14,7 @@ fn ball(lines: &str) -> Scene {
         "[camera]\neye = [0, 1, 5]\ntarget = [0, 0, 0]\n[[mesh]]\nname = \"m\"\nsphere = {{ radius_m = 1, subdivisions = 1 }}\n\
          [[entity]]\nmesh = \"m\"\n{lines}\n"
     );
-    Scene::parse(&text, Path::new("ball.toml"), &nothing).unwrap()
+    parse(&text)
 }
 
 fn near(a: Placement, position: Vec3, rotation: Quat) {
@@ -240,16 +236,6 @@ fn built_in_meshes_are_found_from_any_scene() {
     assert!(error.contains("no.obj") && error.contains("s.toml:4: "), "{error}");
 }
 
-#[test]
-fn camera_up() {
-    let camera = |eye: &str| {
-        let text = format!("[camera]\neye = {eye}\ntarget = [0, 0, 0]\nfov_deg = 30\n");
-        Scene::parse(&text, Path::new("c.toml"), &nothing).unwrap().data.camera
-    };
-    assert_eq!(camera("[0, 1, 1]").up(), Vec3::Y);
-    assert_eq!(camera("[0, 4, 0]").up(), Vec3::NEG_Z);
-}
-
 /// Loads the scene that documentation shows, from a folder that has the picture it names.
 fn documented(text: &str) -> Scene {
     let folder = tempfile::tempdir().unwrap();
@@ -296,7 +282,7 @@ fn each_light_has_the_form_that_its_mesh_gives_it() {
         [[entity]]\nmesh = \"floor\"\n[[entity]]\nmesh = \"ball\"\nemission = [1, 1, 1]\n[[entity]]\nmesh = \"ring\"\nemission = [1, 1, 1]\n\
         [[entity]]\nmesh = \"two\"\nemission = [1, 1, 1]\n\
         [[entity]]\nmesh = \"disc\"\nemission = [1, 1, 1]\n[[entity]]\nmesh = \"tube\"\nemission = [1, 1, 1]\n";
-    let scene = Scene::parse(text, Path::new("lights.toml"), &nothing).unwrap();
+    let scene = parse(text);
     let method = |entity, lights| LightMethod::of(&scene, entity, lights);
     let LightMethod::Ball(share) = method(1, Lights::Sharp) else { panic!("a sphere is a ball") };
     assert!((0.98..1.0).contains(&share), "{share}");

@@ -1,31 +1,21 @@
 //! Plans of farms and results of slices, as any machine may find them in a shared folder.
 
-use super::targets::{NAME, bordered, sealed, with_file};
+use super::common;
+use super::targets::{NAME, framed, unframed, with_file};
+use shadow_fields::Result;
 use shadow_fields::error::Error;
+use shadow_fields::farm::Plan;
 use shadow_fields::farm::engines::{self, Call};
 use shadow_fields::farm::results::{self, SliceResult, missing};
-use shadow_fields::farm::{Film, Input, Plan};
-use shadow_fields::{Result, bake, frame};
 use std::path::{Path, PathBuf};
 
 pub const TOKENS: &str = "\
     \"films\":[|\"meshes\":[|\"slices\":[|\"pictures\":\"#.png\"|{\"meshes\":{\"first\":0,\"count\":1}}|\
     4294967295|4294967290|-1|null|[|]|,";
 
-fn example() -> Plan {
-    let mut plan = Plan::new("none (none)".into(), "results".into(), bake::Options::default());
-    let input = |path: &str| Input { path: path.into(), hash: "00".into() };
-    plan.add_meshes(["a.obj", "b.obj", "c.obj"].map(input).into(), 2);
-    let options = frame::Options::default();
-    let film =
-        Film { scene: input("s.toml"), pictures: "f_#.png".into(), options, exposure_ev: 0.0, first_s: 0.0, fps: 24 };
-    plan.add_film(film, 7, 100);
-    plan
-}
-
 pub fn plans() -> Vec<Vec<u8>> {
     vec![with_file(&[], |path| {
-        example().write(path).unwrap();
+        common::plan().write(path).unwrap();
         std::fs::read(path).unwrap()
     })]
 }
@@ -45,7 +35,7 @@ pub fn plan(bytes: &[u8]) -> Result<()> {
 fn with_plan<R>(run: impl FnOnce(&Plan, &Path) -> R) -> R {
     thread_local! {
         static PLAN: (Plan, PathBuf) = {
-            let mut plan = example();
+            let mut plan = common::plan();
             plan.folder = with_file(&[], |path| path.parent().unwrap().to_owned());
             let path = results::path(&plan, 0);
             (plan, path)
@@ -60,14 +50,14 @@ pub fn slices() -> Vec<Vec<u8>> {
         std::fs::write(folder.path().join("a.sf"), [7; 20]).unwrap();
         std::fs::write(folder.path().join("b"), []).unwrap();
         results::write(plan, 0, folder.path(), 2).unwrap();
-        vec![bordered(std::fs::read(path).unwrap())]
+        vec![unframed(&std::fs::read(path).unwrap())]
     })
 }
 
 pub fn slice(bytes: &[u8]) -> Result<()> {
     with_plan(|plan, path| {
-        std::fs::write(path, sealed(bytes)).unwrap();
-        assert_eq!(missing(plan), [1, 2]);
+        std::fs::write(path, framed(bytes, *b"SHSLICE\n")).unwrap();
+        assert_eq!(missing(plan), [1, 2, 3]);
         match results::find(plan, 0) {
             SliceResult::Whole(files) => {
                 assert!(files.iter().all(|(name, _)| !name.contains('/') && !name.starts_with('.')));

@@ -1,7 +1,7 @@
 //! What bakes store: fields and outlines.
 
 use super::common::generate;
-use super::targets::{NAME, bordered, sealed, with_file};
+use super::targets::{NAME, framed, unframed, with_file};
 use glam::DVec3;
 use serde::de::DeserializeOwned;
 use shadow_fields::error::Error;
@@ -11,11 +11,11 @@ use shadow_fields::field::{FieldKind, ShadowField, Storage};
 use shadow_fields::{Result, bake};
 use std::path::Path;
 
-/// The file that `write` writes, with a zero byte between header and payload so that [`sealed`] finds the border.
+/// What `write` writes.
 fn written(write: impl FnOnce(&Path)) -> Vec<u8> {
     with_file(&[], |path| {
         write(path);
-        bordered(std::fs::read(path).unwrap())
+        unframed(&std::fs::read(path).unwrap())
     })
 }
 
@@ -34,12 +34,12 @@ pub fn fields() -> Vec<Vec<u8>> {
 }
 
 /// What [`file::read`] says to a file of such content, without the file, which would take twice as long.
-fn sealed_file<H: DeserializeOwned>(bytes: &[u8], magic: [u8; 8]) -> Result<(H, Vec<u8>)> {
-    file::parse(&sealed(bytes), Path::new(NAME), magic)
+fn stored_file<H: DeserializeOwned>(bytes: &[u8], magic: [u8; 8]) -> Result<(H, Vec<u8>)> {
+    file::parse(&framed(bytes, magic), Path::new(NAME), magic)
 }
 
 pub fn field(bytes: &[u8]) -> Result<()> {
-    let (header, payload) = sealed_file(bytes, FIELD_MAGIC)?;
+    let (header, payload) = stored_file(bytes, FIELD_MAGIC)?;
     let field = ShadowField::new(header, payload).map_err(|error| Error::input(Path::new(NAME), error))?;
     let mut out = vec![0.0; field.header.bands * field.header.bands];
     for at in [DVec3::new(0.0, 1.5, 0.2), DVec3::new(-30.0, 1.0, 4.0), DVec3::ZERO] {
@@ -71,7 +71,7 @@ pub fn outlines() -> Vec<Vec<u8>> {
 }
 
 pub fn outline(bytes: &[u8]) -> Result<()> {
-    let (header, payload) = sealed_file(bytes, SILHOUETTE_MAGIC)?;
+    let (header, payload) = stored_file(bytes, SILHOUETTE_MAGIC)?;
     let field = SilhouetteField::new(header, payload).map_err(|error| Error::input(Path::new(NAME), error))?;
     for direction in [DVec3::X, DVec3::new(0.3, -0.8, 0.52).normalize()] {
         let near = field.near(DVec3::new(0.4, 2.0, -0.1), direction);

@@ -6,6 +6,7 @@ use shadow_fields::Result;
 use shadow_fields::asset::equirect::Equirect;
 use shadow_fields::asset::{Mesh, embedded, picture};
 use shadow_fields::error::Error;
+use shadow_fields::field::file::VERSION;
 use shadow_fields::scene::{Scene, gltf};
 use std::path::Path;
 
@@ -128,31 +129,22 @@ pub fn with_file<R>(bytes: &[u8], read: impl FnOnce(&Path) -> R) -> R {
     })
 }
 
-/// Lengths and hash as a file has them, so that mutation reaches what is behind them: every second input.
-pub fn sealed(bytes: &[u8]) -> Vec<u8> {
-    let mut out = bytes.to_vec();
-    if out.len() < 56 || out.iter().fold(0_u8, |sum, byte| sum.wrapping_add(*byte)) % 2 == 0 {
-        return out;
-    }
-    let rest = &out[56..];
-    let header = rest.windows(2).position(|pair| pair == b"}\0").map_or(rest.len(), |at| at + 1);
-    let payload = rest[header..].strip_prefix(b"\0").unwrap_or(&rest[header..]).to_vec();
-    let header = rest[..header].to_vec();
-    out.truncate(12);
-    out.extend((header.len() as u32).to_le_bytes());
-    out.extend((payload.len() as u64).to_le_bytes());
-    let hash = blake3::Hasher::new().update(&out).update(&header).update(&payload).finalize();
-    out.extend(hash.as_bytes());
-    out.extend(header);
-    out.extend(payload);
-    out
+/// Header and payload of a stored file with a zero byte between them: what mutation changes.
+pub fn unframed(file: &[u8]) -> Vec<u8> {
+    let payload = 56 + u32::from_le_bytes(file[12..16].try_into().unwrap()) as usize;
+    [&file[56..payload], b"\0", &file[payload..]].concat()
 }
 
-/// A file with a zero byte between header and payload.
-pub fn bordered(mut bytes: Vec<u8>) -> Vec<u8> {
-    let header = u32::from_le_bytes(bytes[12..16].try_into().unwrap()) as usize;
-    bytes.insert(56 + header, 0);
-    bytes
+/// The file of them, whose lengths and hash are right: `tests/files/field_file.rs` tries all others.
+pub fn framed(bytes: &[u8], magic: [u8; 8]) -> Vec<u8> {
+    let (header, payload) =
+        bytes.split_at(bytes.windows(2).position(|pair| pair == b"}\0").map_or(bytes.len(), |at| at + 1));
+    let payload = payload.strip_prefix(b"\0").unwrap_or(payload);
+    let mut out = [&magic[..], &VERSION.to_le_bytes()].concat();
+    out.extend((header.len() as u32).to_le_bytes());
+    out.extend((payload.len() as u64).to_le_bytes());
+    let hash = blake3::Hasher::new().update(&out).update(header).update(payload).finalize();
+    [&out, &hash.as_bytes()[..], header, payload].concat()
 }
 
 fn radiance_picture() -> Vec<u8> {

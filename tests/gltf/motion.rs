@@ -1,9 +1,8 @@
 //! Animations of glTF models as motion of nodes, against the specification's formulas, and that motion as a scene file
 //! has it.
 
-use crate::model;
+use crate::model::{Model, load, near};
 use glam::{DMat4, DQuat, DVec3, Vec3};
-use model::{Model, load};
 use serde_json::json;
 use shadow_fields::scene::keys::{Between, Keys};
 use shadow_fields::scene::motion::{Motion, Node};
@@ -13,19 +12,12 @@ use std::path::Path;
 
 /// Where a point of an entity's space is at a time.
 fn moved(import: &gltf::Import, entity: usize, time_s: f64, point: DVec3) -> DVec3 {
-    let at = import.data.entities[entity].at(time_s);
-    at.position.as_dvec3() + at.turn() * (point * f64::from(at.scale))
-}
-
-fn near(a: DVec3, b: DVec3) -> bool {
-    (a - b).length() < 1e-5 * (1.0 + b.length())
+    import.data.entities[entity].at(time_s).point(point)
 }
 
 /// A cube in a node.
-fn cube(model: &mut Model, node: serde_json::Value) -> usize {
-    let mesh = model.cuboid([-0.5; 3], [0.5; 3], None);
-    let mut node = node;
-    node["mesh"] = json!(mesh);
+fn cube(model: &mut Model, mut node: serde_json::Value) -> usize {
+    node["mesh"] = json!(model.cuboid([-0.5; 3], [0.5; 3], None));
     model.node(node)
 }
 
@@ -185,9 +177,8 @@ fn what_placements_cannot_do_is_told() {
 #[test]
 fn lights_and_cameras_move_with_their_nodes() {
     let mut model = pair();
-    let light = model.light(json!({ "type": "point", "intensity": 5 }));
-    let extension = json!({ "KHR_lights_punctual": { "light": light } });
-    model.child(0, json!({ "name": "lamp", "translation": [0, 0, 2], "extensions": extension }));
+    let lamp = model.light(json!({ "type": "point", "intensity": 5 }));
+    model.child(0, json!({ "name": "lamp", "translation": [0, 0, 2], "extensions": lamp }));
     let camera = model.push("cameras", json!({ "type": "perspective", "perspective": { "yfov": 1, "znear": 0.1 } }));
     model.child(0, json!({ "camera": camera, "translation": [0, 1, 0] }));
     let import = load(&model);

@@ -1,5 +1,6 @@
 //! Primitives of several loose pieces, and lamps that are one quad.
 
+use crate::common::{generate, joined};
 use crate::model::{Model, bench};
 use glam::{Mat3, Quat, Vec3};
 use serde_json::json;
@@ -39,17 +40,10 @@ fn loose_pieces_become_entities() {
 /// Boxes that share a face, an edge or a corner are pieces, whether the face is there twice or lies within.
 #[test]
 fn boxes_that_touch_are_pieces() {
-    let cube = shadow_fields::asset::generate::cuboid(Vec3::ONE, 1);
+    let cube = generate::cuboid(Vec3::ONE, 1);
     let places = [Vec3::ZERO, Vec3::X, Vec3::new(2.0, 1.0, 0.0), Vec3::new(3.0, 2.0, 1.0)];
     let mut model = Model::default();
-    let corners: Vec<f32> =
-        places.iter().flat_map(|place| cube.positions.iter().flat_map(|p| (*p + *place).to_array())).collect();
-    let count = cube.positions.len() as u16;
-    let triangles = || cube.triangles.iter().flatten().map(|v| *v as u16);
-    let indices: Vec<u16> = (0..4).flat_map(|box_| triangles().map(move |v| v + box_ * count)).collect();
-    let positions = model.positions(&corners);
-    let indices = model.indices(&indices);
-    let mesh = model.mesh(json!({ "POSITION": positions }), Some(indices), None);
+    let mesh = model.shape(&joined(&places.map(|place| (&cube, place))), None);
     model.node(json!({ "mesh": mesh, "name": "boxes" }));
     let (_, scene) = load(&model);
     let boxes = scene.entities.iter().filter(|entity| entity.name.starts_with("boxes"));

@@ -1,6 +1,6 @@
 //! Skins, morph targets, instances and named cameras of models that the tests make.
 
-use crate::model::{Model, U8, load, read, refusal};
+use crate::model::{Model, U8, load, read, refusal, world};
 use glam::{DQuat, DVec3, Vec3};
 use serde_json::{Value, json};
 use shadow_fields::scene::{Scene, gltf};
@@ -8,10 +8,7 @@ use shadow_fields::scene::{Scene, gltf};
 /// A mesh in the world, at time 0 of a file at a time.
 fn posed(model: &Model, time_s: f64) -> (Vec<DVec3>, gltf::Import) {
     let import = read(model, &gltf::Options { time_s, ..gltf::Options::default() }).unwrap();
-    let entity = &import.data.entities[0];
-    let mesh = import.data.meshes.iter().position(|mesh| mesh.name == entity.mesh).unwrap();
-    let at = entity.at(0.0);
-    (import.meshes[mesh].positions.iter().map(|p| at.point(p.as_dvec3())).collect(), import)
+    (world(&import, 0, 0.0), import)
 }
 
 fn assert_near(points: &[DVec3], expected: &[[f64; 3]]) {

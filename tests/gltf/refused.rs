@@ -2,7 +2,7 @@
 //! JSON.
 
 use crate::cli::Folder;
-use crate::model::{F32, Model, U8, glb, room};
+use crate::model::{F32, Model, U8, glb, read, refusal, room};
 use serde_json::{Value, json};
 
 /// The program refuses the file with one line that has all parts, and writes nothing.
@@ -11,21 +11,20 @@ fn refused(folder: &Folder, file: &str, parts: &[&str]) {
     folder.refused(&format!("import {file} -o out.toml"), 4, &[&[start.as_str()], parts].concat());
 }
 
-/// As [`refused`], for a model.
+/// The reader refuses a model with one line that has all parts.
 fn refused_model(model: &Model, parts: &[&str]) {
-    let folder = Folder::new();
-    model.write(folder.path(), "m");
-    refused(&folder, "m.glb", parts);
+    let line = refusal(read(model, &Default::default()));
+    parts.iter().for_each(|part| assert!(line.contains("m.glb: ") && line.contains(part), "no {part:?} in {line:?}"));
 }
 
-/// As [`refused`], for a model after a change of its JSON.
+/// As [`refused_model`], after a change of its JSON.
 fn refused_after(change: impl FnOnce(&mut Value), parts: &[&str]) {
     let mut model = room();
     change(&mut model.json);
     refused_model(&model, parts);
 }
 
-/// As [`refused`], for the room with one value of its JSON after another replaced.
+/// The same of the room with one value of its JSON after another replaced.
 fn refused_values(rows: &[(&str, Value, [&str; 2])]) {
     for (path, value, parts) in rows {
         refused_after(|json| *json.pointer_mut(path).unwrap() = value.clone(), parts);
@@ -247,9 +246,7 @@ fn bombs() {
     refused_model(&model, &[]);
     // A texture that states a huge size.
     let mut model = room();
-    let view = model.view(&crate::common::huge_png());
-    let image = model.push("images", json!({ "bufferView": view, "mimeType": "image/png" }));
-    let texture = model.push("textures", json!({ "source": image }));
+    let texture = model.texture("image/png", &crate::common::huge_png());
     model.json["materials"][0]["pbrMetallicRoughness"]["baseColorTexture"] = json!({ "index": texture });
     refused_model(&model, &["images[0]: 65535 x 65535 pixels"]);
     // One node for each of more entities than a scene has.

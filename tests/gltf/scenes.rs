@@ -1,33 +1,15 @@
 //! glTF as scenes: shapes, placements, lights and cameras of models that the tests make.
 
 use crate::model;
-use glam::{DMat4, DQuat, DVec3, Vec3};
-use model::{F32, I8, I16, Model, U8, U16, U32, cuboid, load};
+use glam::{DMat4, DQuat, DVec3, Quat, Vec3};
+use model::{F32, I8, I16, Model, U8, U16, U32, corners, cuboid, load, near, world};
 use serde_json::json;
 use shadow_fields::scene::{Surroundings, gltf};
 use shadow_fields::truth::RayCast;
 use std::path::Path;
 
-/// Vertices of an entity in the world at a time.
-fn world(import: &gltf::Import, entity: usize, time_s: f64) -> Vec<DVec3> {
-    let data = &import.data.entities[entity];
-    let mesh = import.data.meshes.iter().position(|mesh| mesh.name == data.mesh).unwrap();
-    let at = data.at(time_s);
-    let place = |p: &Vec3| at.position.as_dvec3() + at.turn() * (p.as_dvec3() * f64::from(at.scale));
-    import.meshes[mesh].positions.iter().map(place).collect()
-}
-
-/// Lower and upper corner.
-fn corners(points: &[DVec3]) -> [DVec3; 2] {
-    points.iter().fold([DVec3::INFINITY, DVec3::NEG_INFINITY], |[low, high], p| [low.min(*p), high.max(*p)])
-}
-
-fn near(a: DVec3, b: DVec3) -> bool {
-    (a - b).length() < 1e-5 * (1.0 + b.length())
-}
-
 fn assert_box(points: &[DVec3], low: [f64; 3], high: [f64; 3]) {
-    let [a, b] = corners(points);
+    let [a, b] = points.iter().fold([DVec3::INFINITY, DVec3::NEG_INFINITY], |[a, b], p| [a.min(*p), b.max(*p)]);
     assert!(near(a, low.into()) && near(b, high.into()), "{a} to {b}, not {low:?} to {high:?}");
 }
 
@@ -114,16 +96,11 @@ fn uniform_scales_are_placements_and_others_are_baked() {
 fn normals_follow_their_surface_through_uneven_and_mirrored_scales() {
     for scale in [[1.0, 2.0, 4.0], [-1.0, 2.0, 4.0], [-1.0, -1.0, -3.0]] {
         let mut model = Model::default();
-        let (positions, normals, indices) = cuboid([-1.0; 3], [1.0; 3]);
         // Slanted, so that a wrong transformation shows.
-        let turn = DQuat::from_axis_angle(DVec3::new(1.0, 1.0, 0.3).normalize(), 0.9);
-        let turned = |of: &[f32]| -> Vec<f32> {
-            of.chunks_exact(3).flat_map(|p| (turn * Vec3::from_slice(p).as_dvec3()).as_vec3().to_array()).collect()
-        };
-        let positions = model.positions(&turned(&positions));
-        let normals = model.floats(3, &turned(&normals));
-        let indices = model.indices(&indices);
-        let mesh = model.mesh(json!({ "POSITION": positions, "NORMAL": normals }), Some(indices), None);
+        let turn = Quat::from_axis_angle(Vec3::new(1.0, 1.0, 0.3).normalize(), 0.9);
+        let mut slanted = cuboid([-1.0; 3], [1.0; 3]);
+        slanted.positions.iter_mut().chain(&mut slanted.normals).for_each(|vector| *vector = turn * *vector);
+        let mesh = model.shape(&slanted, None);
         model.node(json!({ "mesh": mesh, "scale": scale }));
         let mesh = load(&model).meshes[0].clone();
         for triangle in &mesh.triangles {
@@ -140,15 +117,16 @@ fn normals_follow_their_surface_through_uneven_and_mirrored_scales() {
 
 #[test]
 fn indexed_or_not_with_normals_or_without_it_is_the_same_box() {
-    let (positions, normals, indices) = cuboid([0.0; 3], [1.0, 2.0, 3.0]);
-    let apart = |of: &[f32]| -> Vec<f32> { indices.iter().flat_map(|i| of[3 * *i as usize..][..3].to_vec()).collect() };
+    let solid = cuboid([0.0; 3], [1.0, 2.0, 3.0]);
+    let indices = corners(&solid);
+    let apart = |of: &[Vec3]| -> Vec<f32> { indices.iter().flat_map(|i| of[*i as usize].to_array()).collect() };
     let mut model = Model::default();
-    let indexed = model.cuboid([0.0; 3], [1.0, 2.0, 3.0], None);
-    let p = model.positions(&apart(&positions));
-    let n = model.floats(3, &apart(&normals));
+    let indexed = model.shape(&solid, None);
+    let p = model.positions(&apart(&solid.positions));
+    let n = model.floats(3, &apart(&solid.normals));
     let plain = model.mesh(json!({ "POSITION": p, "NORMAL": n }), None, None);
     let bare = model.mesh(json!({ "POSITION": p }), None, None);
-    let shared = model.positions(&positions);
+    let shared = model.positions(bytemuck::cast_slice(&solid.positions));
     let i = model.indices(&indices);
     let bare_indexed = model.mesh(json!({ "POSITION": shared }), Some(i), None);
     let bytes: Vec<u8> = indices.iter().map(|i| *i as u8).collect();
@@ -282,11 +260,9 @@ fn lights_are_balls_of_their_intensity() {
     let sun = model.light(json!({ "type": "directional", "intensity": 3, "color": [1, 0.5, 0] }));
     let dark = model.light(json!({ "type": "point", "intensity": 0 }));
     let half = std::f32::consts::FRAC_1_SQRT_2;
-    let extension = json!({ "KHR_lights_punctual": { "light": sun } });
-    model.node(json!({ "name": "sun", "rotation": [-half, 0, 0, half], "extensions": extension }));
+    model.node(json!({ "name": "sun", "rotation": [-half, 0, 0, half], "extensions": sun }));
     for (light, name) in [(point, "lamp at"), (sun, "second sun"), (dark, "dark")] {
-        let extension = json!({ "KHR_lights_punctual": { "light": light } });
-        model.node(json!({ "name": name, "translation": [1, 4, 2], "scale": [3, 3, 3], "extensions": extension }));
+        model.node(json!({ "name": name, "translation": [1, 4, 2], "scale": [3, 3, 3], "extensions": light }));
     }
     let import = load(&model);
     let lamps: Vec<_> = import.data.entities.iter().filter(|e| e.mesh == "lamp").collect();
@@ -327,8 +303,7 @@ fn spots_shine_within_their_cone() {
     let light = model.light(json!({ "type": "spot", "intensity": 10, "color": [1, 0.5, 0.25], "spot": spot }));
     let half = std::f32::consts::FRAC_1_SQRT_2;
     let outer = model.node(json!({ "scale": [2, 2, 2], "translation": [0, 1, 0] }));
-    let extension = json!({ "KHR_lights_punctual": { "light": light } });
-    model.child(outer, json!({ "translation": [0, 0.5, 0], "rotation": [-half, 0, 0, half], "extensions": extension }));
+    model.child(outer, json!({ "translation": [0, 0.5, 0], "rotation": [-half, 0, 0, half], "extensions": light }));
     let (mut scene, notes) = model::scene(&model);
     scene.surround(&Surroundings::None).unwrap();
     assert_eq!(notes.left_out(), [""; 0]);

@@ -33,10 +33,6 @@ fn options(levels: bool) -> bake::Options {
     bake::Options { lattice: "cube:9x3".parse().unwrap(), storage: Storage::F32, levels, ..Default::default() }
 }
 
-fn off(found: &[f32], wanted: &[f32]) -> f64 {
-    relative_rms(found.iter().zip(wanted).map(|(found, wanted)| (f64::from(*found), f64::from(*wanted))))
-}
-
 fn field(gpu: &Gpu, mesh: &Mesh, levels: bool) -> (Vec<f32>, BakeReport, f64) {
     let header = bake::header(mesh, FieldKind::Occlusion, &options(levels));
     let (field, report) = gpu.baker().field(mesh, header, &|_, _| ()).unwrap();
@@ -48,7 +44,7 @@ fn fields_are_those_of_the_whole_mesh() {
     let Some(gpu) = gpu() else { return };
     for (mesh, least) in [(scanned(5), 1.8), (generate::torus(1.0, 0.4, 160, 80), 2.5)] {
         let ((found, with, texels), (wanted, without, none)) = (field(&gpu, &mesh, true), field(&gpu, &mesh, false));
-        let off = off(&found, &wanted);
+        let off = relative_rms(found.into_iter().zip(wanted));
         let times = without.triangles as f64 / with.triangles as f64;
         assert!(texels > 0.0 && none == 0.0);
         assert!(times > least, "{}: only {times:.2} times fewer triangles", mesh.name);

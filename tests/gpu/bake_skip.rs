@@ -1,12 +1,11 @@
 //! What a bake leaves out: faces and backs, samples inside solids, and equal meshes.
 
-use crate::common;
-use common::{generate, gpu, parse};
+use crate::common::{generate, gpu, parse};
 use glam::DVec3;
 use shadow_fields::asset::Mesh;
 use shadow_fields::bake::cache::Cache;
 use shadow_fields::bake::triangles::unit_positions;
-use shadow_fields::bake::{self, Baker, SceneNeeds, capture};
+use shadow_fields::bake::{self, SceneNeeds, capture};
 use shadow_fields::field::{FieldHeader, FieldKind, Storage};
 use shadow_fields::scene::Scene;
 use shadow_fields::scene_buffers::SceneBuffers;
@@ -32,11 +31,10 @@ fn the_same_mesh_under_two_names_is_baked_once() {
         let rest = "[environment]\nuniform = [1, 1, 1]\n[camera]\neye = [0, 0, 5]\ntarget = [0, 0, 0]\n";
         parse(&format!("{text}{rest}"))
     };
-    let baker = Baker::new(&gpu.device, &gpu.library);
     let options = bake::Options { lattice: "cube:3x3".parse().unwrap(), face_px: 16, ..Default::default() };
     let buffers = |scene: &Scene| {
         let needs = SceneNeeds::of(scene, &options, shadow_fields::scene::Lights::Sh);
-        let baked = bake::ensure(&baker, &Cache::new(None), scene, &needs, &|_, _, _| ()).unwrap();
+        let baked = bake::ensure(&gpu.baker(), &Cache::new(None), scene, &needs, &|_, _, _| ()).unwrap();
         assert_eq!(baked.meshes.len(), 2);
         SceneBuffers::new(&gpu.device, scene, &options, baked).unwrap()
     };

@@ -1,8 +1,7 @@
 //! Capture on the device against rays cast on the host: coverage, culling, faces left out, and colours on the right
 //! faces.
 
-use crate::common;
-use common::{Gpu, generate, gpu};
+use crate::common::{Gpu, generate, gpu, joined};
 use glam::{Quat, Vec3};
 use shadow_fields::asset::Mesh;
 use shadow_fields::bake::capture::{Capture, Model, NO_SLOT, Way};
@@ -12,18 +11,11 @@ use shadow_fields::field::FieldKind;
 const FACE_PX: u32 = 32;
 const WAYS: [Way; 2] = [Way::Drawn, Way::Computed];
 
-/// Coverage of every eye's faces, true where the object is; faces without a slot are `None`.
-fn coverage(gpu: &Gpu, mesh: &Mesh, eyes: &[Vec3], cull: bool, way: Way) -> Vec<[Option<Vec<bool>>; 6]> {
-    let is_object = |texel: &u8| match texel {
-        0 => true,
-        255 => false,
-        other => panic!("a texel of {other}: neither object nor background"),
-    };
-    let found = faces::<u8>(&gpu.baker(), mesh, eyes, (FACE_PX, FieldKind::Occlusion, cull), way).unwrap();
+/// Texels of every eye's faces, 0 where the object is and 255 elsewhere; faces without a slot are `None`.
+fn coverage(gpu: &Gpu, mesh: &Mesh, eyes: &[Vec3], cull: bool, way: Way) -> Vec<[Option<Vec<u8>>; 6]> {
+    let found = faces(&gpu.baker(), mesh, eyes, (FACE_PX, FieldKind::Occlusion, cull), way).unwrap();
+    assert!(found.iter().flatten().flatten().flatten().all(|texel| [0, 255].contains(texel)));
     found
-        .iter()
-        .map(|faces| faces.each_ref().map(|face| face.as_ref().map(|t| t.iter().map(is_object).collect())))
-        .collect()
 }
 
 fn tilted_plane() -> Mesh {
@@ -95,42 +87,29 @@ fn culled_from_inside_a_solid_nothing_is_left() {
     for way in WAYS {
         let covered = |cull| {
             let faces = &coverage(&gpu, &mesh, &eyes, cull, way)[0];
-            faces.iter().flatten().flatten().filter(|c| **c).count()
+            faces.iter().flatten().flatten().filter(|texel| **texel == 0).count()
         };
         assert_eq!(covered(true), 0, "{way:?}");
         assert_eq!(covered(false), 6 * (FACE_PX * FACE_PX) as usize, "{way:?}");
     }
 }
 
-/// One colour a direction, all components different.
-fn wall_color(direction: Vec3) -> Vec3 {
-    (direction + Vec3::splat(2.0)) * Vec3::new(1.0, 0.5, 4.0)
-}
-
-/// Walls of a box around the origin; `inner` is a small box of one colour in front of one wall, in either order.
+/// Walls of a box around the origin, of one colour a direction, all components different; and a small box of one colour
+/// in front of one wall, in either order.
 fn painted_box(inner_first: bool) -> Mesh {
     let walls = generate::cuboid(Vec3::splat(2.0), 3);
     let small = generate::cuboid(Vec3::splat(0.1), 1);
-    let painted = |mesh: &Mesh, offset: Vec3, color: &dyn Fn(Vec3) -> Vec3| {
-        let positions: Vec<Vec3> = mesh.positions.iter().map(|p| *p + offset).collect();
-        let colors: Vec<Vec3> = mesh.normals.iter().map(|n| color(*n)).collect();
-        (positions, colors, mesh.triangles.clone())
-    };
-    let mut parts = [
-        painted(&walls, Vec3::ZERO, &wall_color),
-        painted(&small, Vec3::new(0.0, 0.0, 0.6), &|_| Vec3::new(9.0, 0.0, 0.25)),
-    ];
+    let mut parts = [(&walls, Vec3::ZERO), (&small, Vec3::new(0.0, 0.0, 0.6))];
     if inner_first {
         parts.reverse();
     }
-    let (mut positions, mut colors, mut triangles) = (Vec::new(), Vec::new(), Vec::new());
-    for (p, c, t) in parts {
-        let first = positions.len() as u32;
-        positions.extend(p);
-        colors.extend(c);
-        triangles.extend(t.iter().map(|t| t.map(|i| i + first)));
-    }
-    Mesh::new("painted box", positions, Vec::new(), Some(colors), triangles).unwrap()
+    let both = joined(&parts);
+    let color = |(place, normal): (&Vec3, &Vec3)| {
+        let is_wall = place.abs().max_element() > 0.9;
+        if is_wall { (*normal + 2.0) * Vec3::new(1.0, 0.5, 4.0) } else { Vec3::new(9.0, 0.0, 0.25) }
+    };
+    let colors = both.positions.iter().zip(&both.normals).map(color).collect();
+    Mesh::new("painted box", both.positions, Vec::new(), Some(colors), both.triangles).unwrap()
 }
 
 /// Colours of the nearest surface, as rays find them: on a mesh that hides parts of itself.

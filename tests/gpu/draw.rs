@@ -1,7 +1,8 @@
 //! Pictures: what stands where, what hides what, and in which colour.
 
-use crate::stage;
-use glam::{Quat, Vec2, Vec3};
+use crate::common::{Gpu, gpu, relative_rms};
+use crate::stage::{at, scene, small};
+use glam::{DVec2, EulerRot, Quat, Vec2, Vec3};
 use shadow_fields::asset::environment::EnvironmentData;
 use shadow_fields::asset::mesh::Attributes;
 use shadow_fields::asset::texture::{Texels, Texture, Wrap};
@@ -12,7 +13,6 @@ use shadow_fields::frame;
 use shadow_fields::scene::data::{Camera, EntityData};
 use shadow_fields::scene::{Albedo, Placement, Scene};
 use shadow_fields::shaders::Library;
-use stage::{at, scene, small, stage};
 use std::sync::Arc;
 
 const WIDTH: usize = 96;
@@ -34,13 +34,11 @@ fn balls(environment: &str, emissions: &[[f32; 3]]) -> Scene {
 
 type Picture = Vec<[f32; 3]>;
 
-fn draw(stage: &stage::Stage, scene: &Scene, places: &[[f32; 3]], antialias: Antialias, white: f32) -> Picture {
+fn draw(gpu: &Gpu, scene: &Scene, places: &[[f32; 3]], antialias: Antialias, white: f32) -> Picture {
     let placements: Vec<_> = places.iter().map(|&[x, y, z]| at(x, y, z)).collect();
-    let mut frame = stage.frame(scene, options(antialias));
+    let mut frame = gpu.frame(scene, options(antialias));
     frame.render(&placements, Some(white)).unwrap();
-    let picture = frame.picture();
-    assert_eq!(picture.len(), 3 * WIDTH * HEIGHT);
-    picture.chunks_exact(3).map(|p| [p[0], p[1], p[2]]).collect()
+    frame.picture().as_chunks().0.to_vec()
 }
 
 /// Middle of what has a channel, in pixels from the left and the top, and its area in pixels.
@@ -59,11 +57,11 @@ const BLUE: [f32; 3] = [0.0, 0.0, 1.0];
 
 #[test]
 fn things_stand_where_they_should() {
-    let Some(stage) = stage() else { return };
+    let Some(gpu) = gpu() else { return };
     let scene = balls("", &[RED]);
     // 40 degrees over 64 pixels at 5 m: 17.58 pixels a metre.
     let px_per_m = HEIGHT as f32 / (2.0 * 5.0 * 20_f32.to_radians().tan());
-    let see = |place| middle(&draw(&stage, &scene, &[place], Antialias::Samples, 1.0), 0);
+    let see = |place| middle(&draw(&gpu, &scene, &[place], Antialias::Samples, 1.0), 0);
     for (place, x, y) in [
         ([0.0, 0.0, 0.0], 0.0, 0.0),
         ([1.0, 0.0, 0.0], 1.0, 0.0),
@@ -85,24 +83,24 @@ fn things_stand_where_they_should() {
 
 #[test]
 fn nearer_hides_farther() {
-    let Some(stage) = stage() else { return };
+    let Some(gpu) = gpu() else { return };
     let scene = balls("", &[RED, BLUE]);
     let centre = WIDTH / 2 + HEIGHT / 2 * WIDTH;
     for (places, front) in [([[0.0, 0.0, 1.0], [0.0, 0.0, -1.0]], RED), ([[0.0, 0.0, -1.0], [0.0, 0.0, 1.0]], BLUE)] {
-        let picture = draw(&stage, &scene, &places, Antialias::Samples, 1.0);
+        let picture = draw(&gpu, &scene, &places, Antialias::Samples, 1.0);
         assert_eq!(picture[centre], front, "places {places:?}");
         let back = if front == RED { 2 } else { 0 };
         assert_eq!(middle(&picture, back)[2].max(0.0), 0.0, "the nearer ball covers the farther one");
     }
     // Large balls 300 m away, 1 cm one behind the other: reversed depth in f32 tells them apart.
-    let mut frame = stage.frame(&scene, options(Antialias::Samples));
+    let mut frame = gpu.frame(&scene, options(Antialias::Samples));
     let far = |z| Placement { scale: 40.0, ..at(0.0, 0.0, z) };
     for (placements, front) in [([far(-300.0), far(-300.01)], RED), ([far(-300.01), far(-300.0)], BLUE)] {
         frame.render(&placements, Some(1.0)).unwrap();
         let found = frame.picture()[3 * centre..][..3].iter().map(|c| c.round()).collect::<Vec<_>>();
         assert_eq!(found, front);
     }
-    let behind = draw(&stage, &scene, &[[0.0, 0.0, 7.0], [0.0, 0.0, 6.0]], Antialias::Samples, 1.0);
+    let behind = draw(&gpu, &scene, &[[0.0, 0.0, 7.0], [0.0, 0.0, 6.0]], Antialias::Samples, 1.0);
     assert!(behind.iter().flatten().all(|c| *c == 0.0), "what is behind the camera is not seen");
 }
 
@@ -110,11 +108,11 @@ fn nearer_hides_farther() {
 /// drawn again.
 #[test]
 fn nothing_in_view_is_a_picture_too() {
-    let Some(stage) = stage() else { return };
+    let Some(gpu) = gpu() else { return };
     let scene = balls("environment = { uniform = [0.25, 0.5, 0.75] }", &[RED, BLUE]);
     let (seen, unseen) = ([at(-0.5, 0.0, 0.0), at(0.5, 0.2, 0.0)], [at(0.0, 0.0, 9.0), at(0.0, 1.0, 9.0)]);
     for antialias in [Antialias::None, Antialias::Samples, Antialias::Outlines] {
-        let mut frame = stage.frame(&scene, options(antialias));
+        let mut frame = gpu.frame(&scene, options(antialias));
         let is_background = |picture: &[f32]| picture.chunks_exact(3).all(|p| *p == [0.25, 0.5, 0.75]);
         frame.render(&unseen, Some(1.0)).unwrap();
         assert!(is_background(&frame.picture()), "{antialias:?}: nothing in the first picture");
@@ -132,11 +130,11 @@ fn nothing_in_view_is_a_picture_too() {
 /// A picture that several render passes make is the one of a single pass, with samples and without.
 #[test]
 fn batches_change_nothing() {
-    let Some(stage) = stage() else { return };
+    let Some(gpu) = gpu() else { return };
     let scene = balls("", &[[1.0, 0.0, 0.0], [0.0, 0.0, 1.0]]);
     let placements = [at(-0.3, 0.0, 0.0), at(0.3, 0.2, 0.5)];
     for antialias in [Antialias::None, Antialias::Samples, Antialias::Outlines] {
-        let mut frame = stage.frame(&scene, options(antialias));
+        let mut frame = gpu.frame(&scene, options(antialias));
         frame.render(&placements, Some(1.0)).unwrap();
         let whole = frame.picture();
         assert!(whole.iter().any(|c| *c > 0.5));
@@ -150,10 +148,10 @@ fn batches_change_nothing() {
 
 #[test]
 fn background_is_the_mean_of_the_sky() {
-    let Some(stage) = stage() else { return };
+    let Some(gpu) = gpu() else { return };
     // The gradient's mean: base .2 + rise .8 / 4.
     let sky = "environment = { uniform = [0.1, 0.2, 0.3], gradient = { radiance = [1, 0.5, 0] } }";
-    let picture = draw(&stage, &balls(sky, &[RED]), &[[0.0, 0.0, 0.0]], Antialias::Samples, 1.0);
+    let picture = draw(&gpu, &balls(sky, &[RED]), &[[0.0, 0.0, 0.0]], Antialias::Samples, 1.0);
     for corner in [0, WIDTH - 1, WIDTH * (HEIGHT - 1), WIDTH * HEIGHT - 1] {
         for (found, expected) in picture[corner].iter().zip([0.5, 0.4, 0.3]) {
             // Half floats: 11 bits.
@@ -164,10 +162,10 @@ fn background_is_the_mean_of_the_sky() {
 
 #[test]
 fn edges_are_smooth_with_samples_only() {
-    let Some(stage) = stage() else { return };
+    let Some(gpu) = gpu() else { return };
     let scene = balls("", &[[1.0, 1.0, 1.0]]);
     let between = |antialias| {
-        let picture = draw(&stage, &scene, &[[0.0, 0.0, 0.0]], antialias, 1.0);
+        let picture = draw(&gpu, &scene, &[[0.0, 0.0, 0.0]], antialias, 1.0);
         // Rounded: interpolated vertex attributes and half floats are off by 5e-4.
         let mut levels: Vec<i32> = picture.iter().map(|p| (400.0 * p[0]).round() as i32).collect();
         levels.sort_unstable();
@@ -181,7 +179,7 @@ fn edges_are_smooth_with_samples_only() {
 /// A ball before another, a box with creases and a floor that ends in sight, judged by 64 samples a pixel.
 #[test]
 fn outlines_are_smoother_than_four_samples() {
-    let Some(stage) = stage() else { return };
+    let Some(gpu) = gpu() else { return };
     let ball = |color: &str| format!("[[entity]]\nmesh = \"ball\"\nreceives = false\nemission = {color}\n");
     let text = "environment = { key = { radiance = [3, 3, 3], toward = [1, 2, 3], sharpness = 2 } }\n\
         [[mesh]]\nname = \"ball\"\nsphere = { radius_m = 0.4, subdivisions = 3 }\n\
@@ -189,33 +187,25 @@ fn outlines_are_smoother_than_four_samples() {
         [[mesh]]\nname = \"floor\"\nplane = { size_m = 3, cells = 4 }\n\
         [[entity]]\nmesh = \"box\"\n[[entity]]\nmesh = \"floor\"\nalbedo = [0.3, 0.6, 0.3]\n";
     let scene = scene(&(text.to_owned() + &ball("[0.9, 0.5, 0.3]") + &ball("[0.2, 0.6, 0.9]")));
-    let turned = glam::Quat::from_euler(glam::EulerRot::YXZ, 0.5, 0.6, 0.2);
-    let tilted = glam::Quat::from_rotation_x(0.4);
+    let turned = Quat::from_euler(EulerRot::YXZ, 0.5, 0.6, 0.2);
+    let tilted = Quat::from_rotation_x(0.4);
     let placements = [
         Placement { rotation: turned, ..at(0.6, 0.3, 0.3) },
         Placement { rotation: tilted, ..at(0.1, -0.4, 0.0) },
         at(-0.8, 0.2, 0.0),
         at(-0.5, 0.4, -0.6),
     ];
-    let grid: Vec<glam::DVec2> =
-        (0..64).map(|i| (glam::DVec2::new(f64::from(i % 8), f64::from(i / 8)) + 0.5) / 8.0).collect();
+    let grid: Vec<DVec2> = (0..64).map(|i| (DVec2::new(f64::from(i % 8), f64::from(i / 8)) + 0.5) / 8.0).collect();
     let mut wanted = Vec::new();
     let [none, samples, outlines] = [Antialias::None, Antialias::Samples, Antialias::Outlines].map(|antialias| {
-        let mut frame = stage.frame(&scene, options(antialias));
+        let mut frame = gpu.frame(&scene, options(antialias));
         frame.render(&placements, Some(1.0)).unwrap();
         if wanted.is_empty() {
             wanted = frame.twin_texels(&placements, 1.0, &grid).unwrap();
         }
-        frame.picture()
+        let found = frame.picture().into_iter().map(f64::from);
+        relative_rms(found.zip(wanted.iter().flat_map(|texel| texel.color.to_array())))
     });
-    let error = |picture: &[f32]| {
-        let squares = picture.chunks_exact(3).zip(&wanted).map(|(found, wanted)| {
-            let found = glam::DVec3::new(found[0].into(), found[1].into(), found[2].into());
-            found.distance_squared(wanted.color)
-        });
-        (squares.sum::<f64>() / wanted.len() as f64).sqrt()
-    };
-    let [none, samples, outlines] = [none, samples, outlines].map(|picture| error(&picture));
     assert!(outlines < 0.4 * none && outlines < samples, "none {none}, samples {samples}, outlines {outlines}");
 }
 
@@ -223,13 +213,13 @@ fn outlines_are_smoother_than_four_samples() {
 /// as it is where the values of vertices are extrapolated to a pixel's centre outside.
 #[test]
 fn slivers_are_no_brighter_than_their_vertices() {
-    let Some(stage) = stage() else { return };
+    let Some(gpu) = gpu() else { return };
     let folder = tempfile::tempdir().unwrap();
     for (name, text) in shadow_fields::shaders::FILES.iter().filter(|(name, _)| name.ends_with(".frag")) {
         std::fs::write(folder.path().join(name), text.replace("centroid ", "")).unwrap();
     }
-    let library = Library { shader_dir: Some(folder.path().to_path_buf()), ..stage.gpu.library.clone() };
-    let extrapolating = Baker::new(&stage.gpu.device, &library);
+    let library = Library { shader_dir: Some(folder.path().to_path_buf()), ..gpu.library.clone() };
+    let extrapolating = Baker::new(&gpu.device, &library);
     let most = 0.5;
     let mut positions = Vec::new();
     let mut colors = Vec::new();
@@ -254,7 +244,7 @@ fn slivers_are_no_brighter_than_their_vertices() {
     let scene = Scene::builder().camera(Camera::new([0.0, 0.0, 5.0], [0.0; 3])).mesh("slivers", mesh).entity(slivers);
     let scene = scene.build().unwrap();
     let options = options(Antialias::Samples);
-    let frames = [stage.frame(&scene, options), stage.frame_on(&extrapolating, &scene, options)];
+    let frames = [gpu.frame(&scene, options), gpu.frame_on(&extrapolating, &scene, options)];
     let [within, beyond] = frames.map(|mut frame| {
         frame.render(&scene.at(0.0), Some(f32::INFINITY)).unwrap();
         frame.picture().into_iter().fold(0.0, f32::max)
@@ -266,21 +256,21 @@ fn slivers_are_no_brighter_than_their_vertices() {
 /// Lines of what is hidden leave no trace, also where the same entity hides itself.
 #[test]
 fn hidden_outlines_leave_no_trace() {
-    let Some(stage) = stage() else { return };
+    let Some(gpu) = gpu() else { return };
     let scene = balls("environment = { uniform = [0.1, 0.1, 0.1] }", &[RED, BLUE]);
-    let picture = |place| draw(&stage, &scene, &[[0.0, 0.0, 1.0], place], Antialias::Outlines, 1.0);
+    let picture = |place| draw(&gpu, &scene, &[[0.0, 0.0, 1.0], place], Antialias::Outlines, 1.0);
     assert!(picture([0.0, 0.0, -1.0]) == picture([0.0, 0.0, 9.0]), "behind the first and behind the camera");
     assert!(picture([0.5, 0.0, -1.0]) != picture([0.0, 0.0, 9.0]), "beside it, it is seen");
 }
 
 #[test]
 fn white_keeps_hue() {
-    let Some(stage) = stage() else { return };
+    let Some(gpu) = gpu() else { return };
     let scene = balls("", &[[8.0, 4.0, 2.0], [0.25, 0.5, 0.125]]);
     let places = [[-1.0, 0.0, 0.0], [1.0, 0.0, 0.0]];
     let centre = |picture: &Picture, x: f32| picture[(48.0 + 17.58 * x) as usize + HEIGHT / 2 * WIDTH];
     for (white, bright) in [(1.0, [1.0, 0.5, 0.25]), (4.0, [4.0, 2.0, 1.0]), (f32::INFINITY, [8.0, 4.0, 2.0])] {
-        let picture = draw(&stage, &scene, &places, Antialias::Samples, white);
+        let picture = draw(&gpu, &scene, &places, Antialias::Samples, white);
         for (x, expected) in [(-1.0, bright), (1.0, [0.25, 0.5, 0.125])] {
             let found = centre(&picture, x);
             // Two half-float steps.
@@ -293,12 +283,12 @@ fn white_keeps_hue() {
 /// Drawn radiance is emission plus radiosity: a floor under a white sky is as bright as its albedo.
 #[test]
 fn lit_surfaces_have_their_radiosity() {
-    let Some(stage) = stage() else { return };
+    let Some(gpu) = gpu() else { return };
     let text = "environment = { uniform = [1, 1, 1] }\n[[mesh]]\nname = \"wall\"\nplane = { size_m = 9, cells = 3 }\n\
         [[entity]]\nmesh = \"wall\"\nalbedo = [0.25, 0.5, 0.75]\nemission = [0.5, 0, 0]\nemits = false\n\
         rotation = { axis = [1, 0, 0], angle_deg = 90 }\n";
     let scene = scene(text);
-    let mut frame = stage.frame(&scene, options(Antialias::Samples));
+    let mut frame = gpu.frame(&scene, options(Antialias::Samples));
     frame.render(&scene.at(0.0), Some(f32::INFINITY)).unwrap();
     let picture = frame.picture();
     for (found, expected) in picture.chunks_exact(3).flatten().zip([0.75_f32, 0.5, 0.75].iter().cycle()) {
@@ -306,18 +296,22 @@ fn lit_surfaces_have_their_radiosity() {
     }
 }
 
+/// A quad of two triangles with the whole of a texture on it.
+fn quad(corners: [[f32; 3]; 4], tints: Option<Vec<Vec3>>) -> Mesh {
+    let uvs = [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]].map(Vec2::from).to_vec();
+    let attributes = Attributes { uvs: Some(uvs), tints, ..Attributes::default() };
+    let corners = corners.map(Vec3::from).to_vec();
+    Mesh::with_attributes("quad", corners, Vec::new(), attributes, vec![[0, 1, 2], [0, 2, 3]]).unwrap()
+}
+
 /// A texture shows at every pixel what its texel reflects of the light that a grey surface gets there, whether the pixel
 /// evaluates a sharp light itself or not; what its alpha masks is not there.
 #[test]
 fn textures_multiply_the_light_of_a_grey_surface() {
-    let Some(stage) = stage() else { return };
+    let Some(gpu) = gpu() else { return };
     let wall = |albedo: Albedo| {
-        let corners = [[-2.0, -2.0, 0.0], [2.0, -2.0, 0.0], [2.0, 2.0, 0.0], [-2.0, 2.0, 0.0]].map(Vec3::from).to_vec();
-        let uvs = [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]].map(Vec2::from).to_vec();
-        let tints = vec![Vec3::new(1.0, 0.25, 1.0); 4];
-        let attributes = Attributes { uvs: Some(uvs), tints: Some(tints), ..Attributes::default() };
-        let triangles = vec![[0, 1, 2], [0, 2, 3]];
-        let mesh = Mesh::with_attributes("wall", corners, Vec::new(), attributes, triangles).unwrap();
+        let corners = [[-2.0, -2.0, 0.0], [2.0, -2.0, 0.0], [2.0, 2.0, 0.0], [-2.0, 2.0, 0.0]];
+        let mesh = quad(corners, Some(vec![Vec3::new(1.0, 0.25, 1.0); 4]));
         let rgba = vec![[255, 0, 0, 255], [0, 255, 0, 255], [0, 0, 255, 255], [255, 255, 255, 100]];
         let texels = Some(Arc::new(Texels { width: 2, height: 2, rgba }));
         let factor = Vec3::new(0.5, 1.0, 1.0);
@@ -338,7 +332,7 @@ fn textures_multiply_the_light_of_a_grey_surface() {
                 ..EntityData::of_mesh("ball")
             });
         let scene = scene.build().unwrap();
-        let mut frame = stage.frame(&scene, options(Antialias::Samples));
+        let mut frame = gpu.frame(&scene, options(Antialias::Samples));
         let timings = frame.render(&scene.at(0.0), Some(f32::INFINITY)).unwrap();
         assert!(frame.pixels_evaluated(&timings).is_none_or(|count| count > 100), "no pixel evaluates a light");
         frame.picture()
@@ -374,11 +368,8 @@ fn textures_multiply_the_light_of_a_grey_surface() {
 /// Far from edges a texture looks the same with four samples a pixel as with one, also where it is seen slanted.
 #[test]
 fn textures_are_even_under_four_samples() {
-    let Some(stage) = stage() else { return };
-    let corners = [[-2.0, -1.0, 2.0], [2.0, -1.0, 2.0], [2.0, 0.5, -8.0], [-2.0, 0.5, -8.0]].map(Vec3::from).to_vec();
-    let uvs = [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]].map(Vec2::from).to_vec();
-    let attributes = Attributes { uvs: Some(uvs), ..Attributes::default() };
-    let mesh = Mesh::with_attributes("floor", corners, Vec::new(), attributes, vec![[0, 1, 2], [0, 2, 3]]).unwrap();
+    let Some(gpu) = gpu() else { return };
+    let mesh = quad([[-2.0, -1.0, 2.0], [2.0, -1.0, 2.0], [2.0, 0.5, -8.0], [-2.0, 0.5, -8.0]], None);
     let rgba = (0..16 * 16).map(|i| [255 * (i as u8 % 2), 255 * (i / 16 % 2) as u8, 0, 255]).collect();
     let texels = Some(Arc::new(Texels { width: 16, height: 16, rgba }));
     let texture = Texture { texels, wrap: [Wrap::Clamp; 2], factor: Vec3::ONE, alpha_cutoff: None, alpha_blend: false };
@@ -390,7 +381,7 @@ fn textures_are_even_under_four_samples() {
         .entity(EntityData { albedo: Albedo::Texture("checks".into()), ..EntityData::of_mesh("floor") });
     let scene = scene.build().unwrap();
     let [one, four] = [Antialias::None, Antialias::Samples].map(|antialias| {
-        let mut frame = stage.frame(&scene, options(antialias));
+        let mut frame = gpu.frame(&scene, options(antialias));
         frame.render(&scene.at(0.0), Some(f32::INFINITY)).unwrap();
         frame.picture()
     });

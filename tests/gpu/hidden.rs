@@ -1,13 +1,13 @@
 //! What the camera cannot see is not lit while things move, and not drawn: no picture shows it, and it is lit once it
 //! may be seen or once nothing moves.
 
-use crate::stage;
-use glam::{Quat, Vec3};
+use crate::common::{Gpu, gpu};
+use crate::stage::{jostled, scene, small};
+use glam::Vec3;
 use shadow_fields::draw::Antialias;
 use shadow_fields::frame::{self, Frame};
 use shadow_fields::lists::skip::Skip;
 use shadow_fields::scene::{Camera, Placement, Scene};
-use stage::{Stage, scene, small, stage};
 
 /// Solid, hollow and open things over a floor, one of them around the others.
 fn room() -> Scene {
@@ -31,22 +31,15 @@ fn camera(eye: [f32; 3], target: [f32; 3], fov_deg: f32) -> Camera {
     Camera { eye: eye.into(), target: target.into(), fov_deg }
 }
 
-fn jostled(place: &Placement, rng: &mut fastrand::Rng) -> Placement {
-    let mut step = || (rng.f32() - 0.5) * 0.3;
-    let position = place.position + Vec3::new(step(), 0.2 * step(), step());
-    let rotation = (Quat::from_euler(glam::EulerRot::XYZ, step(), step(), step()) * place.rotation).normalize();
-    Placement { position, rotation, scale: place.scale }
-}
-
 /// Bits of a picture: as files have it, or as a window shows it.
 fn picture(frame: &mut Frame, placements: &[Placement]) -> Vec<u32> {
     frame.render(placements, Some(1.0)).unwrap();
     frame.picture().into_iter().map(f32::to_bits).collect()
 }
 
-fn pair(stage: &Stage, scene: &Scene, options: frame::Options) -> [Frame; 2] {
+fn pair(gpu: &Gpu, scene: &Scene, options: frame::Options) -> [Frame; 2] {
     let without = frame::Options { skip: Skip::without("hidden"), ..options };
-    [stage.frame(scene, options), stage.frame(scene, without)]
+    [gpu.frame(scene, options), gpu.frame(scene, without)]
 }
 
 /// Cameras in turn: one that wanders, one that jumps, one among the things, one inside a ball, one that looks away.
@@ -63,11 +56,11 @@ fn eye(round: usize) -> Camera {
 
 #[test]
 fn pictures_are_the_same_to_the_bit() {
-    let Some(stage) = stage() else { return };
+    let Some(gpu) = gpu() else { return };
     let scene = room();
     for antialias in [Antialias::None, Antialias::Outlines, Antialias::Samples] {
         let options = frame::Options { size: [192, 128], antialias, ..small() };
-        let mut frames = pair(&stage, &scene, options);
+        let mut frames = pair(&gpu, &scene, options);
         let mut placements = scene.at(0.0);
         let mut rng = fastrand::Rng::with_seed(5);
         let mut merged = [0; 2];
@@ -79,7 +72,7 @@ fn pictures_are_the_same_to_the_bit() {
                 _ => vec![rng.usize(1..placements.len()), rng.usize(0..placements.len())],
             };
             for &j in &movers {
-                placements[j] = jostled(&placements[j], &mut rng);
+                placements[j] = jostled(&placements[j], &mut rng, 0.15);
             }
             let pictures = frames.each_mut().map(|frame| {
                 frame.set_camera(&eye(round));
@@ -102,9 +95,9 @@ fn pictures_are_the_same_to_the_bit() {
 /// view, is another than the one with it.
 #[test]
 fn what_comes_into_view_is_lit_then() {
-    let Some(stage) = stage() else { return };
+    let Some(gpu) = gpu() else { return };
     let scene = room();
-    let mut frames = pair(&stage, &scene, frame::Options { size: [160, 120], ..small() });
+    let mut frames = pair(&gpu, &scene, frame::Options { size: [160, 120], ..small() });
     let [before, behind] =
         [camera([0.0, 1.0, 5.0], [0.0, 0.5, 0.0], 30.0), camera([0.0, 1.0, -5.0], [0.0, 0.5, 0.0], 30.0)];
     let mut placements = scene.at(0.0);
@@ -146,9 +139,9 @@ fn what_comes_into_view_is_lit_then() {
 /// A cluster that is merged for the state that holds is not merged again, whatever the camera does.
 #[test]
 fn nothing_is_lit_twice() {
-    let Some(stage) = stage() else { return };
+    let Some(gpu) = gpu() else { return };
     let scene = room();
-    let mut frame = stage.frame(&scene, frame::Options { size: [64, 48], ..small() });
+    let mut frame = gpu.frame(&scene, frame::Options { size: [64, 48], ..small() });
     let mut placements = scene.at(0.0);
     picture(&mut frame, &placements);
     let clusters = frame.merged().clusters;
@@ -164,7 +157,7 @@ fn nothing_is_lit_twice() {
     placements[5].position.x += 0.2;
     picture(&mut frame, &placements);
     assert!(frame.stale_count() > 0);
-    let mut full = stage.frame(&scene, frame::Options { size: [64, 48], skip: Skip::without("hidden"), ..small() });
-    assert_eq!(stage.light(&mut frame, &placements), stage.light(&mut full, &placements));
+    let mut full = gpu.frame(&scene, frame::Options { size: [64, 48], skip: Skip::without("hidden"), ..small() });
+    assert_eq!(gpu.light(&mut frame, &placements), gpu.light(&mut full, &placements));
     assert_eq!(frame.stale_count(), 0);
 }

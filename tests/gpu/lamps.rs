@@ -1,7 +1,6 @@
 //! Rooms that people build and their lamps: pictures beside rays.
 
-use super::common::{generate, relative_rms};
-use super::stage::{Stage, stage};
+use crate::common::{Gpu, generate, gpu, relative_rms};
 use glam::{DQuat, Vec2, Vec3};
 use shadow_fields::asset::Mesh;
 use shadow_fields::asset::environment::EnvironmentData;
@@ -13,7 +12,6 @@ use shadow_fields::scene::data::EntityData;
 use shadow_fields::scene::motion::{Motion, Node, RotationData};
 use shadow_fields::scene::{Camera, Scene};
 use shadow_fields::truth::pixels;
-use shadow_fields::truth::ray_mesh::RayMeshes;
 use shadow_fields::truth::raycast::RayCast;
 use shadow_fields::truth::world::World;
 use std::f32::consts::TAU;
@@ -22,19 +20,22 @@ fn turned(axis: Vec3, angle_deg: f64) -> RotationData {
     RotationData::AxisAngle { axis, angle_deg }
 }
 
+fn slab(position: Vec3, rotation: RotationData) -> EntityData {
+    EntityData { position, rotation, ..EntityData::of_mesh("slab") }
+}
+
 /// Relative RMS of a scene's picture against rays through its pixels, direct light alone.
-fn picture_error(stage: &Stage, scene: &Scene) -> f64 {
+fn picture_error(gpu: &Gpu, scene: &Scene) -> f64 {
     let size = [96, 64];
     let bake = bake::Options { groups: true, vertices: 20_000, ..bake::Options::default() };
     let options = frame::Options { size, bake, bounces: Bounces::None, ..frame::Options::default() };
     let placements = scene.at(0.0);
-    let mut frame = stage.frame(scene, options);
+    let mut frame = gpu.frame(scene, options);
     frame.render(&placements, Some(f32::INFINITY)).unwrap();
-    let shapes = RayMeshes::new(scene);
-    let world = World::new(scene, &shapes, &placements);
+    let world = World::of(scene, &placements);
     let rays = pixels::picture(&world, size, true, &RayCast { rays: 512, runs: 2, ..RayCast::default() }, &|_| ());
     // The lamp itself is brighter than all that it lights.
-    let pairs = frame.picture().into_iter().zip(rays.linear).map(|(found, truth)| (f64::from(found), f64::from(truth)));
+    let pairs = frame.picture().into_iter().zip(rays.linear);
     relative_rms(pairs.filter(|(found, truth)| found.max(*truth) < 0.6))
 }
 
@@ -42,7 +43,7 @@ fn picture_error(stage: &Stage, scene: &Scene) -> f64 {
 /// is behind the lamp hides it, as seen from a vertex or from between vertices.
 #[test]
 fn a_room_of_one_mesh_is_lit_by_its_ceiling_lamp() {
-    let Some(stage) = stage() else { return };
+    let Some(gpu) = gpu() else { return };
     let solid = generate::cuboid(Vec3::splat(2.0), 1);
     let is_front = |t: &[u32; 3]| t.iter().all(|&v| solid.normals[v as usize].z > 0.5);
     let open = solid.triangles.iter().filter(|triangle| !is_front(triangle));
@@ -66,14 +67,14 @@ fn a_room_of_one_mesh_is_lit_by_its_ceiling_lamp() {
             emission: Vec3::splat(10.0),
             ..EntityData::of_mesh("lamp")
         });
-    let error = picture_error(&stage, &scene.build().unwrap());
+    let error = picture_error(&gpu, &scene.build().unwrap());
     assert!(error < 0.06, "{error}");
 }
 
 /// A bulb within a shade lights what lies below, and nothing beside it.
 #[test]
 fn no_light_comes_through_a_lamp_shade() {
-    let Some(stage) = stage() else { return };
+    let Some(gpu) = gpu() else { return };
     // A ring that is open above and below, and a dome with the bulb up to 0.4 radii above the middle of its sphere: the
     // highest lies before its rim as seen from above, and shone through its top.
     let ring = [[0.28, -0.15], [0.16, 0.15], [0.15, 0.15], [0.27, -0.15]];
@@ -81,7 +82,7 @@ fn no_light_comes_through_a_lamp_shade() {
     let dome_heights = [(0.5, 0.03), (0.54, 0.03), (0.58, 0.03), (0.64, 0.15)];
     let in_dome = dome_heights.map(|(height, most)| (&dome[..], height, most));
     for (profile, height, most) in [(&ring[..], 0.62, 0.03)].into_iter().chain(in_dome) {
-        let error = picture_error(&stage, &under_a_shade(profile, height));
+        let error = picture_error(&gpu, &under_a_shade(profile, height));
         assert!(error < most, "{height}: {error}");
     }
 }
@@ -89,7 +90,7 @@ fn no_light_comes_through_a_lamp_shade() {
 /// A globe of glass around a bulb takes its share once of all that leaves it, whether ball or box.
 #[test]
 fn glass_around_a_bulb_takes_its_share() {
-    let Some(stage) = stage() else { return };
+    let Some(gpu) = gpu() else { return };
     let ball = generate::sphere(0.18, 3);
     let lantern = generate::cuboid(Vec3::splat(0.3), 1);
     for (name, glass) in [("ball", ball), ("lantern", lantern)] {
@@ -107,7 +108,7 @@ fn glass_around_a_bulb_takes_its_share() {
                 emission: Vec3::splat(10.0),
                 ..EntityData::of_mesh("bulb")
             });
-        let error = picture_error(&stage, &scene.build().unwrap());
+        let error = picture_error(&gpu, &scene.build().unwrap());
         // 0.068 where vertices alone evaluate lights, and 0.3 or more without a share.
         assert!(error < 0.08, "{name}: {error}");
     }
@@ -116,7 +117,7 @@ fn glass_around_a_bulb_takes_its_share() {
 /// What one node carries looks as if it stood there at rest.
 #[test]
 fn what_is_carried_together_shades_itself_as_at_rest() {
-    let Some(stage) = stage() else { return };
+    let Some(gpu) = gpu() else { return };
     let node = Node::still(Vec3::new(-0.2, 0.1, 0.0), DQuat::from_rotation_y(0.3), 0.9);
     let picture = |motion: Vec<Motion>| {
         let at = |mesh: &str, position: [f32; 3]| {
@@ -141,14 +142,21 @@ fn what_is_carried_together_shades_itself_as_at_rest() {
             .entity(EntityData { emission: Vec3::splat(10.0), ..at("bulb", [0.1, 0.85, 0.05]) });
         let bake = bake::Options { groups: true, vertices: 0, ..bake::Options::default() };
         let scene = scene.build().unwrap();
-        let mut frame = stage.frame(&scene, frame::Options { size: [96, 64], bake, ..frame::Options::default() });
+        let mut frame = gpu.frame(&scene, frame::Options { size: [96, 64], bake, ..frame::Options::default() });
         frame.render(&scene.at(0.0), Some(f32::INFINITY)).unwrap();
         frame.picture()
     };
     let pairs = picture(vec![Motion::Node(Box::new(node.clone()))]).into_iter().zip(picture(Vec::new()));
-    let error = relative_rms(pairs.map(|(carried, rests)| (f64::from(carried), f64::from(rests))));
+    let error = relative_rms(pairs);
     // Rays are cast in the frame of the group.
     assert!(error < 0.015, "{error}");
+}
+
+/// A mesh of quads, four corners each.
+fn of_quads(name: &str, corners: Vec<Vec3>) -> Mesh {
+    let quads = 0..corners.len() as u32 / 4;
+    let triangles = quads.flat_map(|i| [[4 * i, 4 * i + 1, 4 * i + 2], [4 * i, 4 * i + 2, 4 * i + 3]]).collect();
+    Mesh::new(name, corners, Vec::new(), None, triangles).unwrap()
 }
 
 /// A bulb that high within a shade, which is a profile (radius, height) turned around.
@@ -165,11 +173,7 @@ fn under_a_shade(profile: &[[f32; 2]], height: f32) -> Scene {
         let next = i / count * count + (i + 1) % count;
         corners.extend([i, next, next + count, i + count].map(|i| place(i % (count * sides))));
     }
-    let quads = 0..count * sides;
-    let triangles = quads.flat_map(|i| [[4 * i, 4 * i + 1, 4 * i + 2], [4 * i, 4 * i + 2, 4 * i + 3]]).collect();
-    let shade = Mesh::new("shade", corners, Vec::new(), None, triangles).unwrap();
-    let slab =
-        |position: Vec3, rotation: RotationData| EntityData { position, rotation, ..EntityData::of_mesh("slab") };
+    let shade = of_quads("shade", corners);
     let scene = Scene::builder()
         .camera(Camera::new([0.2, 1.1, 2.6], [0.0, 0.4, 0.0]))
         .mesh("slab", generate::cuboid(Vec3::new(4.0, 0.1, 4.0), 1))
@@ -201,16 +205,14 @@ fn wall_with_window() -> Mesh {
         corners.extend([place(b, 0.05), place(a, 0.05), place(a, -0.05), place(b, -0.05)]);
         corners.extend([place(d, 0.05), place(c, 0.05), place(c, -0.05), place(d, -0.05)]);
     }
-    let quads = 0..corners.len() as u32 / 4;
-    let triangles = quads.flat_map(|i| [[4 * i, 4 * i + 1, 4 * i + 2], [4 * i, 4 * i + 2, 4 * i + 3]]).collect();
-    Mesh::new("wall", corners, Vec::new(), None, triangles).unwrap()
+    of_quads("wall", corners)
 }
 
 /// Sunlight falls through a window onto a glossy floor of two triangles: its patch and the highlight within have the
 /// edges that rays find.
 #[test]
 fn a_window_casts_a_patch_of_sunlight_and_its_highlight() {
-    let Some(stage) = stage() else { return };
+    let Some(gpu) = gpu() else { return };
     let gloss = Some(toml::from_str("roughness = 0.4").unwrap());
     for gloss in [None, gloss] {
         let sky = r#"sun = { toward = [0.3, 0.8, -0.9], angle_deg = 2, radiance = [900, 900, 900] }"#;
@@ -221,7 +223,7 @@ fn a_window_casts_a_patch_of_sunlight_and_its_highlight() {
             .mesh("floor", generate::cuboid(Vec3::new(4.0, 0.1, 4.0), 1))
             .entity(EntityData { position: Vec3::new(0.0, -0.05, 0.0), gloss, ..EntityData::of_mesh("floor") })
             .entity(EntityData::of_mesh("wall"));
-        let error = picture_error(&stage, &scene.build().unwrap());
+        let error = picture_error(&gpu, &scene.build().unwrap());
         assert!(error < 0.11, "{error}");
     }
 }
@@ -229,9 +231,7 @@ fn a_window_casts_a_patch_of_sunlight_and_its_highlight() {
 /// A lamp in a thin box hangs right below a slab: nothing of its light gets above that.
 #[test]
 fn no_light_comes_through_the_slab_above_a_lamp() {
-    let Some(stage) = stage() else { return };
-    let slab =
-        |position: Vec3, rotation: RotationData| EntityData { position, rotation, ..EntityData::of_mesh("slab") };
+    let Some(gpu) = gpu() else { return };
     let scene = Scene::builder()
         .camera(Camera::new([0.2, 2.4, 3.2], [0.0, 0.8, 0.0]))
         .mesh("slab", generate::cuboid(Vec3::new(2.4, 0.1, 2.4), 1))
@@ -244,6 +244,6 @@ fn no_light_comes_through_the_slab_above_a_lamp() {
             emission: Vec3::splat(3.0),
             ..EntityData::of_mesh("lamp")
         });
-    let error = picture_error(&stage, &scene.build().unwrap());
+    let error = picture_error(&gpu, &scene.build().unwrap());
     assert!(error < 0.04, "{error}");
 }

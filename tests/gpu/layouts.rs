@@ -1,19 +1,17 @@
 //! Structs that Rust writes and shaders read: every name and offset as the compiler made it, sizes, and strides of
 //! arrays.
 
-use crate::common;
+use crate::common::{gpu, library, usual_permutation};
 use ash::vk;
 use bytemuck::{Pod, Zeroable};
-use common::library;
 use shadow_fields::bake::project::{Project, SampleFaces};
 use shadow_fields::bake::raster::{Face, Raster};
-use shadow_fields::field::{FieldKind, Lattice, Storage};
+use shadow_fields::field::FieldKind;
 use shadow_fields::gpu::reflect::Reflection;
 use shadow_fields::gpu::{Access, Bind, Buffer, Commands, ComputePipeline, TexelView};
 // In a shader there is no other entity.
 use shadow_fields::gloss::gloss_row;
 use shadow_fields::layout::{CLUSTER_FORMAT, Cluster, DeviceEntity as Entity, ENTRY_BITS, GlossEntity};
-use shadow_fields::lists::skip::Skip;
 use shadow_fields::merge::variant::{MergePermutation, Reads, VARIANTS, Variant};
 use shadow_fields::shaders::{Library, ShaderPermutation};
 use std::mem::offset_of;
@@ -31,20 +29,11 @@ macro_rules! same_layout {
 }
 
 fn merge() -> Vec<(Variant, Reflection)> {
-    let permutation = |variant| MergePermutation {
-        variant,
-        bands: 4,
-        storage: Storage::F16,
-        lattice: Lattice { inner: 1.02, ..Lattice::default() },
-        skip: Skip::ALL,
-        lights: true,
-        sheets: true,
-        volume: false,
-        gloss: false,
-        entity_limit: 48,
+    let reflection = |variant: &Variant| {
+        let row = MergePermutation { variant: *variant, ..usual_permutation() }.row();
+        (*variant, library().shader(&row).unwrap().reflection)
     };
-    let reflection = |row| library().shader(&row).unwrap().reflection;
-    VARIANTS.iter().map(|&variant| (variant, reflection(permutation(variant).row()))).collect()
+    VARIANTS.iter().map(reflection).collect()
 }
 
 #[test]
@@ -139,7 +128,7 @@ fn counted<T: Pod>() -> [T; 2] {
 /// every word in place.
 #[test]
 fn entities_and_clusters_read_from_texels() {
-    let Some(gpu) = common::gpu() else { return };
+    let Some(gpu) = gpu() else { return };
     let folder = tempfile::tempdir().unwrap();
     let text = "#version 460
         #include \"merge_layout.glsl\"

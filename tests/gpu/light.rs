@@ -1,11 +1,11 @@
 //! What the merged light must be, whatever the implementation: closed forms, symmetries, continuity. All on the device.
 
-use crate::stage;
+use crate::common::{Gpu, gpu};
+use crate::stage::{self, at, difference, scene, small};
 use glam::{DVec3, Quat, Vec3};
 use shadow_fields::lists::skip::Skip;
 use shadow_fields::scene::{Placement, Scene};
 use shadow_fields::{bake, frame};
-use stage::{at, difference, scene, small, stage};
 
 /// A denser lattice for comparisons with closed forms, f32. Faces are fine, because a walk along a row of samples meets
 /// one or two of them at a time, and a texel too many or too few of each counts.
@@ -14,11 +14,6 @@ fn fine() -> frame::Options {
         bake: bake::Options { lattice: "cube:12x7,edges=auto".parse().unwrap(), face_px: 128, ..small().bake },
         ..small()
     }
-}
-
-/// The lattice and faces that the command line bakes by default, in f32.
-fn defaults() -> frame::Options {
-    frame::Options { bake: bake::Options { storage: small().bake.storage, ..Default::default() }, ..small() }
 }
 
 /// The same radiance 1 from everywhere.
@@ -31,13 +26,13 @@ fn entity(mesh: &str, more: &str) -> String {
     format!("[[entity]]\nmesh = \"{mesh}\"\nalbedo = [1, 1, 1]\n{more}\n")
 }
 
-fn lit(scene: &Scene, options: frame::Options, stage: &stage::Stage) -> Vec<Vec<[f32; 3]>> {
-    stage.light(&mut stage.frame(scene, options), &scene.at(0.0))
+fn lit(scene: &Scene, options: frame::Options, gpu: &Gpu) -> Vec<Vec<[f32; 3]>> {
+    gpu.light(&mut gpu.frame(scene, options), &scene.at(0.0))
 }
 
 #[test]
 fn white_furnace() {
-    let Some(stage) = stage() else { return };
+    let Some(gpu) = gpu() else { return };
     let turns =
         ["", "rotation = { axis = [1, 2, -0.5], angle_deg = 77 }", "rotation = { axis = [0, 0, 1], angle_deg = 180 }"];
     let mut text = format!("{WHITE_SKY}{PATCH}{BALL}{BOX}");
@@ -47,7 +42,7 @@ fn white_furnace() {
         }
     }
     let scene = scene(&text);
-    let light = lit(&scene, small(), &stage);
+    let light = lit(&scene, small(), &gpu);
     assert_eq!(light.len(), 27);
     let worst = light.iter().flatten().flatten().fold(0.0_f32, |m, b| m.max((b - 1.0).abs()));
     assert!(worst < 1e-3, "{worst:e}");
@@ -58,15 +53,15 @@ fn white_furnace() {
 /// of it.
 #[test]
 fn occluder_from_zenith_to_nadir() {
-    let Some(stage) = stage() else { return };
+    let Some(gpu) = gpu() else { return };
     let scene =
         scene(&format!("{WHITE_SKY}{PATCH}{BALL}{}{}", entity("patch", ""), entity("ball", "receives = false")));
     let middle = scene.meshes[0].positions.iter().position(|p| *p == Vec3::ZERO).unwrap();
     for skip in [Skip::NONE, Skip::ALL] {
-        let mut frame = stage.frame(&scene, frame::Options { skip, ..fine() });
+        let mut frame = gpu.frame(&scene, frame::Options { skip, ..fine() });
         carry_around(skip, &mut |distance, angle| {
             let ball = at((distance * angle.sin()) as f32, (distance * angle.cos()) as f32, 0.0);
-            f64::from(stage.light(&mut frame, &[at(0.0, 0.0, 0.0), ball])[0][middle][0])
+            f64::from(gpu.light(&mut frame, &[at(0.0, 0.0, 0.0), ball])[0][middle][0])
         });
     }
 }
@@ -128,42 +123,27 @@ fn pop(walk: &[f64]) -> f64 {
         .fold(0.0, f64::max)
 }
 
-/// A patch, a box and two lights, one of them nearer than the box.
-const GROUP: &str = r#"
-[[mesh]]
-name = "floor"
-plane = { size_m = 4, cells = 16 }
-[[mesh]]
-name = "ring"
-torus = { major_m = 0.5, minor_m = 0.2, segments = 24, sides = 12 }
-[[entity]]
-mesh = "floor"
-[[entity]]
-mesh = "box"
-position = [0.317, 0.871, -0.213]
-rotation = { axis = [1, 0.3, -0.4], angle_deg = 67 }
-[[entity]]
-mesh = "ring"
-position = [-0.917, 0.671, 0.413]
-rotation = { axis = [0.2, 0.3, 1], angle_deg = 40 }
-[[entity]]
-mesh = "ball"
-position = [1.13, 1.61, 0.87]
-scale = 0.2
-emission = [5, 4, 3]
-[[entity]]
-mesh = "ball"
-position = [-1.31, 2.53, -0.79]
-scale = 0.3
-emission = [3, 4, 5]
-"#;
-
+/// A patch, a box, a ring and two lights, one of them nearer than the box, under a sky whose key comes from `key`.
 fn group(key: Vec3) -> Scene {
     let Vec3 { x, y, z } = key;
-    let sky = format!(
-        "uniform = [0.2, 0.2, 0.3], key = {{ radiance = [1, 0.9, 0.8], toward = [{x}, {y}, {z}], sharpness = 4 }}"
-    );
-    scene(&format!("environment = {{ {sky} }}\n{BALL}{BOX}{GROUP}"))
+    scene(&format!(
+        r#"
+environment = {{ uniform = [0.2, 0.2, 0.3], key = {{ radiance = [1, 0.9, 0.8], toward = [{x}, {y}, {z}], sharpness = 4 }} }}
+mesh = [
+    {{ name = "floor", plane = {{ size_m = 4, cells = 16 }} }},
+    {{ name = "ring", torus = {{ major_m = 0.5, minor_m = 0.2, segments = 24, sides = 12 }} }},
+    {{ name = "ball", sphere = {{ radius_m = 1, subdivisions = 3 }} }},
+    {{ name = "box", cuboid = {{ size_m = [1.6, 0.9, 0.7], cells = 4 }} }},
+]
+entity = [
+    {{ mesh = "floor" }},
+    {{ mesh = "box", position = [0.317, 0.871, -0.213], rotation = {{ axis = [1, 0.3, -0.4], angle_deg = 67 }} }},
+    {{ mesh = "ring", position = [-0.917, 0.671, 0.413], rotation = {{ axis = [0.2, 0.3, 1], angle_deg = 40 }} }},
+    {{ mesh = "ball", position = [1.13, 1.61, 0.87], scale = 0.2, emission = [5, 4, 3] }},
+    {{ mesh = "ball", position = [-1.31, 2.53, -0.79], scale = 0.3, emission = [3, 4, 5] }},
+]
+"#
+    ))
 }
 
 fn moved(placements: &[Placement], rotation: Quat, shift: Vec3, scale: f32) -> Vec<Placement> {
@@ -177,65 +157,65 @@ fn moved(placements: &[Placement], rotation: Quat, shift: Vec3, scale: f32) -> V
 
 #[test]
 fn one_motion_of_everything_changes_nothing() {
-    let Some(stage) = stage() else { return };
+    let Some(gpu) = gpu() else { return };
     let key = Vec3::new(0.4, 1.0, 0.3).normalize();
     let rest = group(key);
     let placements = rest.at(0.0);
-    let before = lit(&rest, small(), &stage);
+    let before = lit(&rest, small(), &gpu);
     // An odd angle; and a third of a turn about (1, 1, 1), which carries the axes into each other.
     for (axis, angle) in [(Vec3::new(0.3, -0.8, 0.6), 2.345_f32), (Vec3::ONE, std::f32::consts::TAU / 3.0)] {
         let rotation = Quat::from_axis_angle(axis.normalize(), angle);
         let shift = Vec3::new(37.3, -21.7, 55.1);
         let turned = group(rotation * key);
-        let after = stage.light(&mut stage.frame(&turned, small()), &moved(&placements, rotation, shift, 1.0));
+        let after = gpu.light(&mut gpu.frame(&turned, small()), &moved(&placements, rotation, shift, 1.0));
         let worst = before.iter().zip(&after).map(|(a, b)| difference(a, b).0).fold(0.0, f32::max);
         assert!(worst < 1e-4, "{worst:e}");
     }
     // The test can fail: without its environment the group does change.
     let rotation = Quat::from_rotation_x(0.2);
-    let after = stage.light(&mut stage.frame(&rest, small()), &moved(&placements, rotation, Vec3::ZERO, 1.0));
+    let after = gpu.light(&mut gpu.frame(&rest, small()), &moved(&placements, rotation, Vec3::ZERO, 1.0));
     assert!(difference(&before[0], &after[0]).0 > 1e-2);
 }
 
 #[test]
 fn size_does_not_matter() {
-    let Some(stage) = stage() else { return };
+    let Some(gpu) = gpu() else { return };
     let scene = group(Vec3::Y);
     let placements = scene.at(0.0);
-    let mut frame = stage.frame(&scene, small());
-    let before = stage.light(&mut frame, &placements);
+    let mut frame = gpu.frame(&scene, small());
+    let before = gpu.light(&mut frame, &placements);
     for scale in [1e-3, 1e3] {
-        let after = stage.light(&mut frame, &moved(&placements, Quat::IDENTITY, Vec3::ZERO, scale));
+        let after = gpu.light(&mut frame, &moved(&placements, Quat::IDENTITY, Vec3::ZERO, scale));
         let worst = before.iter().zip(&after).map(|(a, b)| difference(a, b).0).fold(0.0, f32::max);
         assert!(worst < 1e-4, "scale {scale}: {worst:e}");
     }
     // Large meshes instead of large scales: the fields are baked from other coordinates.
-    let large = |text: &str| stage::scene(&text.replace("R", "1000").replace("S", "0.001"));
-    let text = format!(
-        "{WHITE_SKY}{PATCH}[[mesh]]\nname = \"m\"\nsphere = {{ radius_m = R, subdivisions = 2 }}\n{}{}",
-        entity("patch", ""),
-        entity("m", "scale = S\nposition = [0.3, 1.4, 0.2]")
-    );
-    let plain = stage::scene(&text.replace("radius_m = R", "radius_m = 1").replace("scale = S", "scale = 1"));
-    let (a, b) = (lit(&plain, small(), &stage), lit(&large(&text), small(), &stage));
-    let (worst, _) = difference(&a[0], &b[0]);
+    let of = |radius_m: f64, scale: f64| {
+        let mesh = format!("[[mesh]]\nname = \"m\"\nsphere = {{ radius_m = {radius_m}, subdivisions = 2 }}\n");
+        let ball = entity("m", &format!("scale = {scale}\nposition = [0.3, 1.4, 0.2]"));
+        let scene = stage::scene(&format!("{WHITE_SKY}{PATCH}{mesh}{}{ball}", entity("patch", "")));
+        lit(&scene, small(), &gpu).remove(0)
+    };
+    let (worst, _) = difference(&of(1.0, 1.0), &of(1000.0, 0.001));
     assert!(worst < 1e-4, "{worst:e}");
 }
 
 /// A sphere that spins in place shades the same, but for its facets and the interpolation between samples.
 #[test]
 fn spinning_sphere_shows_the_interpolation_error() {
-    let Some(stage) = stage() else { return };
+    let Some(gpu) = gpu() else { return };
     let floor = "[[mesh]]\nname = \"floor\"\nplane = { size_m = 8, cells = 24 }\n";
     let text = format!("{WHITE_SKY}{floor}{BALL}{}{}", entity("floor", ""), entity("ball", "receives = false"));
     let scene = scene(&text);
-    let mut frame = stage.frame(&scene, defaults());
+    // The lattice and faces that the command line bakes by default, in f32.
+    let bake = bake::Options { storage: small().bake.storage, ..Default::default() };
+    let mut frame = gpu.frame(&scene, frame::Options { bake, ..small() });
     let turned = |rotation| Placement { rotation, ..at(0.1, 1.1, -0.2) };
     let mut spins = Vec::new();
     for i in 0..12_u8 {
         let axis = Vec3::new(f32::from(i).sin(), f32::from(i).cos(), 0.5).normalize();
         let rotation = Quat::from_axis_angle(axis, 0.5 * f32::from(i));
-        spins.push(stage.light(&mut frame, &[at(0.0, 0.0, 0.0), turned(rotation)]).swap_remove(0));
+        spins.push(gpu.light(&mut frame, &[at(0.0, 0.0, 0.0), turned(rotation)]).swap_remove(0));
     }
     let mut worst = 0.0_f64;
     let mut square = 0.0;
@@ -255,17 +235,17 @@ fn spinning_sphere_shows_the_interpolation_error() {
 /// The convention of the cosine: a vertex receives light from the side that its normal faces, and none from behind.
 #[test]
 fn light_comes_from_where_it_stands() {
-    let Some(stage) = stage() else { return };
+    let Some(gpu) = gpu() else { return };
     let light = "emission = [50, 50, 50]\nscale = 0.2\nposition = [1.5, 2, -0.5]";
     let scene = scene(&format!("{PATCH}{BALL}{}{}", entity("patch", ""), entity("ball", light)));
-    let mut frame = stage.frame(&scene, fine());
+    let mut frame = gpu.frame(&scene, fine());
     let middle = scene.meshes[0].positions.iter().position(|p| *p == Vec3::ZERO).unwrap();
     let rest = scene.at(0.0);
     let toward = DVec3::new(1.5, 2.0, -0.5);
     let distance = toward.length();
     for normal in [DVec3::Y, DVec3::X, DVec3::NEG_Z, DVec3::new(0.6, 0.64, 0.48), DVec3::NEG_Y, DVec3::NEG_X] {
         let rotation = Quat::from_rotation_arc(Vec3::Y, normal.as_vec3());
-        let found = stage.light(&mut frame, &[Placement { rotation, ..rest[0] }, rest[1]])[0][middle][0];
+        let found = gpu.light(&mut frame, &[Placement { rotation, ..rest[0] }, rest[1]])[0][middle][0];
         // A small sphere of radiance L at distance d: E = pi L (r/d)^2 cos, B = E / pi.
         let full = 50.0 * (0.2 / distance).powi(2);
         let expected = full * (normal.dot(toward) / distance).max(0.0);

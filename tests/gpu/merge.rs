@@ -1,7 +1,7 @@
 //! The merge on the device against its twin in f64, which reads the same stored numbers; and the barriers of a frame.
 
-use crate::{common, stage};
-use common::report;
+use crate::common::{Gpu, gpu, open, report};
+use crate::stage::{difference, scene, small};
 use shadow_fields::asset::{Generator, embedded};
 use shadow_fields::bake::Baker;
 use shadow_fields::bake::silhouette::SilhouetteOptions;
@@ -14,7 +14,6 @@ use shadow_fields::gpu::Device;
 use shadow_fields::lists::skip::Skip;
 use shadow_fields::merge::variant::{VARIANTS, Variant};
 use shadow_fields::scene::{Placement, Scene};
-use stage::{Stage, scene, small, stage};
 use std::path::Path;
 use std::sync::Arc;
 
@@ -37,7 +36,7 @@ fn built_in(name: &str, text: &str) -> Scene {
 
 #[test]
 fn built_in_scenes() {
-    let Some(stage) = stage() else { return };
+    let Some(gpu) = gpu() else { return };
     let scenes = embedded::scenes();
     assert_eq!(scenes.len(), 7);
     // Of the room, 2 vertices of 27 000 differ by 0.003 and 0.0007: faces of boxes lie in the planes of others there.
@@ -45,7 +44,7 @@ fn built_in_scenes() {
         let scene = built_in(name, text);
         let options =
             frame::Options { bake: shadow_fields::bake::Options { storage: Storage::F16, ..small().bake }, ..small() };
-        let mut frame = stage.frame(&scene, options);
+        let mut frame = gpu.frame(&scene, options);
         for time_s in [0.0, 1.7] {
             agrees(&format!("{name} at {time_s} s"), &mut frame, &scene.at(time_s));
         }
@@ -55,25 +54,25 @@ fn built_in_scenes() {
 /// Skips and lattices are compared by `check`.
 #[test]
 fn variants_and_bands() {
-    let Some(stage) = stage() else { return };
+    let Some(gpu) = gpu() else { return };
     let scene = scene(MIXED);
     let placements = scene.at(0.0);
     let base = small();
     let mut first: Option<Vec<Vec<[f32; 3]>>> = None;
     for &variant in VARIANTS {
-        let mut frame = stage.frame(&scene, frame::Options { variant: Some(variant), ..base });
+        let mut frame = gpu.frame(&scene, frame::Options { variant: Some(variant), ..base });
         assert_eq!(frame.variant(), variant, "the scene is small enough for each");
         agrees(variant.name, &mut frame, &placements);
-        let light = stage.light(&mut frame, &placements);
+        let light = gpu.light(&mut frame, &placements);
         for (a, b) in light.iter().zip(first.get_or_insert_with(|| light.clone())) {
-            let (worst, brightest) = stage::difference(a, b);
+            let (worst, brightest) = difference(a, b);
             // The same operations, perhaps fused otherwise.
             assert!(worst <= 2e-6 * (1.0 + brightest), "{}: {worst:e} from the first variant", variant.name);
         }
     }
     for bands in [2, 3, 5] {
         let bake = shadow_fields::bake::Options { bands, ..base.bake };
-        agrees(&format!("{bands} bands"), &mut stage.frame(&scene, frame::Options { bake, ..base }), &placements);
+        agrees(&format!("{bands} bands"), &mut gpu.frame(&scene, frame::Options { bake, ..base }), &placements);
     }
 }
 
@@ -106,19 +105,8 @@ fn six_lights() -> Scene {
 }
 
 #[test]
-fn six_lights_add_up() {
-    let Some(stage) = stage() else { return };
-    let scene = six_lights();
-    let mut frame = stage.frame(&scene, small());
-    let placements = scene.at(0.0);
-    agrees("six lights", &mut frame, &placements);
-    let once = stage.light(&mut frame, &placements);
-    assert_eq!(once, stage.light(&mut frame, &placements), "a frame leaves nothing to the next");
-}
-
-#[test]
 fn emitters_that_occlude_and_receive() {
-    let Some(stage) = stage() else { return };
+    let Some(gpu) = gpu() else { return };
     let entity = |more: &str| format!("[[entity]]\nmesh = \"ball\"\n{more}\n");
     let two = |switches: &str| {
         let lit = entity(&format!("position = [-0.617, 0.731, 0.113]\nemission = [9, 7, 5]\n{switches}"));
@@ -127,10 +115,10 @@ fn emitters_that_occlude_and_receive() {
     };
     let (shining, blocking) = (two(""), two("occludes = true"));
     let placements = blocking.at(0.0);
-    let mut frame = stage.frame(&blocking, small());
+    let mut frame = gpu.frame(&blocking, small());
     agrees("emitter that occludes", &mut frame, &placements);
-    let blocked = stage.light(&mut frame, &placements);
-    let open = stage.light(&mut stage.frame(&shining, small()), &placements);
+    let blocked = gpu.light(&mut frame, &placements);
+    let open = gpu.light(&mut gpu.frame(&shining, small()), &placements);
     let sum = |light: &[[f32; 3]]| light.iter().map(|v| v[2]).sum::<f32>();
     // Rays leave .970 of the floor's light; cones that only begin to meet count less, so the merge leaves .986.
     let left = sum(&blocked[0]) / sum(&open[0]);
@@ -139,7 +127,7 @@ fn emitters_that_occlude_and_receive() {
     assert!(sum(&open[1]) > 0.0 && sum(&open[2]) > 0.0, "lights are lit by each other");
 
     let alone = scene(&format!("{FLOOR_AND_BALL}{}", entity("position = [0, 0.9, 0]\nemission = [9, 7, 5]")));
-    let light = stage.light(&mut stage.frame(&alone, small()), &alone.at(0.0));
+    let light = gpu.light(&mut gpu.frame(&alone, small()), &alone.at(0.0));
     assert!(light[1].iter().flatten().all(|b| *b == 0.0), "nothing is lit by its own light");
     assert!(sum(&light[0]) > 0.0);
 }
@@ -148,14 +136,14 @@ fn emitters_that_occlude_and_receive() {
 /// in the file decides whether the occluder counts.
 #[test]
 fn ties_go_by_index() {
-    let Some(stage) = stage() else { return };
+    let Some(gpu) = gpu() else { return };
     let light = "[[entity]]\nmesh = \"ball\"\nposition = [0.55, 0.75, 0]\nemission = [9, 7, 5]\n";
     let block = "[[entity]]\nmesh = \"ball\"\nposition = [-0.55, 0.75, 0]\n";
     let line = |text: &str| {
         let scene = scene(&format!("{FLOOR_AND_BALL}{text}"));
-        let mut frame = stage.frame(&scene, small());
+        let mut frame = gpu.frame(&scene, small());
         agrees("tie", &mut frame, &scene.at(0.0));
-        let floor = stage.light(&mut frame, &scene.at(0.0)).swap_remove(0);
+        let floor = gpu.light(&mut frame, &scene.at(0.0)).swap_remove(0);
         let positions = &scene.meshes[0].positions;
         let on_line: Vec<_> = (0..floor.len()).filter(|&v| positions[v].x == 0.0).map(|v| floor[v]).collect();
         assert_eq!(on_line.len(), 21);
@@ -164,7 +152,7 @@ fn ties_go_by_index() {
     let (before, after) = (line(&format!("{block}{light}")), line(&format!("{light}{block}")));
     let alone = line(light);
     assert_eq!(after, alone, "an occluder behind the light changes nothing");
-    let (worst, _) = stage::difference(&before, &alone);
+    let (worst, _) = difference(&before, &alone);
     assert!(worst > 1e-3, "an occluder before the light counts: {worst:e}");
     // Two occluders equally far: swapping them changes the order of two products that commute but for truncation.
     let again = line(&format!("{block}{light}{block}"));
@@ -196,7 +184,7 @@ fn crowd() -> (Scene, frame::Options) {
 
 /// A device whose texel views are shorter than the lists of [`crowd`] and longer than everything else.
 fn short_views() -> Arc<Device> {
-    let mut device = common::open().unwrap();
+    let mut device = open().unwrap();
     Arc::get_mut(&mut device).unwrap().limits.max_texel_buffer_elements = 8192;
     device
 }
@@ -204,22 +192,22 @@ fn short_views() -> Arc<Device> {
 /// Lists that texel views cannot hold are read from storage blocks, in the very frame in which they are too long.
 #[test]
 fn lists_too_long_for_texel_views() {
-    let Some(stage) = stage() else { return };
+    let Some(gpu) = gpu() else { return };
     let (scene, base) = crowd();
     let placements = scene.at(0.0);
     let variant = |name: &str| Some(Variant::named(name).unwrap());
     let expected =
-        stage.light(&mut stage.frame(&scene, frame::Options { variant: variant("storage"), ..base }), &placements);
+        gpu.light(&mut gpu.frame(&scene, frame::Options { variant: variant("storage"), ..base }), &placements);
     let device = short_views();
-    let baker = Baker::new(&device, &stage.gpu.library);
+    let baker = Baker::new(&device, &gpu.library);
     for name in ["texel-packed", "texel-shifted"] {
-        let mut frame = stage.frame_on(&baker, &scene, frame::Options { variant: variant(name), ..base });
+        let mut frame = gpu.frame_on(&baker, &scene, frame::Options { variant: variant(name), ..base });
         assert_eq!(frame.variant().name, name, "all but the lists has room");
-        let found = stage.light(&mut frame, &placements);
+        let found = gpu.light(&mut frame, &placements);
         assert_eq!(frame.variant().name, "storage", "{name}");
-        let (worst, brightest) = stage::difference(&found[0], &expected[0]);
+        let (worst, brightest) = difference(&found[0], &expected[0]);
         assert!(brightest > 0.1 && worst <= 2e-6 * (1.0 + brightest), "{name}: {worst:e} of {brightest}");
-        assert_eq!(stage.light(&mut frame, &placements), found, "{name}: a frame leaves nothing to the next");
+        assert_eq!(gpu.light(&mut frame, &placements), found, "{name}: a frame leaves nothing to the next");
     }
     assert_eq!(device.take_validation_messages(), [""; 0]);
 }
@@ -227,14 +215,13 @@ fn lists_too_long_for_texel_views() {
 /// Pixels whose chains texel views cannot hold leave sharp lights to vertices.
 #[test]
 fn chains_too_long_for_texel_views() {
-    let Some(stage) = stage() else { return };
+    let Some(gpu) = gpu() else { return };
     let (scene, base) = crowd();
     let device = short_views();
-    let baker = Baker::new(&device, &stage.gpu.library);
+    let baker = Baker::new(&device, &gpu.library);
     let picture = |baker: Option<&Baker>, shading: Shading| {
         let options = frame::Options { shading: Some(shading), size: [96, 64], ..base };
-        let mut frame =
-            baker.map_or_else(|| stage.frame(&scene, options), |baker| stage.frame_on(baker, &scene, options));
+        let mut frame = baker.map_or_else(|| gpu.frame(&scene, options), |baker| gpu.frame_on(baker, &scene, options));
         frame.render(&scene.at(0.0), Some(1.0)).unwrap();
         frame.picture()
     };
@@ -247,20 +234,18 @@ fn chains_too_long_for_texel_views() {
 /// Every barrier of a frame is needed: left out, the frame is refused with pass and resource named, and nothing runs.
 #[test]
 fn every_barrier_is_needed() {
-    let Some(stage) = stage() else { return };
+    let Some(gpu) = gpu() else { return };
     let scene = six_lights();
-    let mut frame = stage.frame(&scene, small());
+    let mut frame = gpu.frame(&scene, small());
     let (rest, mut moved) = (scene.at(0.0), scene.at(0.0));
     moved.iter_mut().for_each(|p| p.position.x += 0.3);
     frame.render(&rest, Some(1.0)).unwrap();
     let light = frame.radiosity(0).unwrap();
     let picture = frame.picture();
-    let refused = |frame: &mut Frame, stage: &Stage, index: usize| {
-        stage.gpu.device.omit_barrier(Some(index));
-        let outcome = frame.render(&moved, Some(1.0));
-        stage.gpu.device.omit_barrier(None);
+    let refused = |frame: &mut Frame, gpu: &Gpu, index: usize| {
+        let outcome = gpu.without_barrier(index, || frame.render(&moved, Some(1.0)));
         // The layer hears most of these while they are recorded, but not a dispatch after a dispatch on one buffer.
-        let heard = stage.gpu.device.take_validation_messages().len();
+        let heard = gpu.device.take_validation_messages().len();
         report(&format!("without barrier {index}: {heard} messages of the layer"));
         outcome.err().map(|error| error.to_string())
     };
@@ -272,11 +257,11 @@ fn every_barrier_is_needed() {
         ("readback", "pass read back and pass host"),
     ];
     for (index, (resource, passes)) in expected.into_iter().enumerate() {
-        let message = refused(&mut frame, &stage, index).unwrap_or_else(|| panic!("barrier {index} is not missed"));
+        let message = refused(&mut frame, &gpu, index).unwrap_or_else(|| panic!("barrier {index} is not missed"));
         assert!(message.contains(resource) && message.contains(passes), "barrier {index}: {message}");
         assert_eq!(frame.radiosity(0).unwrap(), light, "nothing was submitted");
         assert_eq!(frame.picture(), picture, "nothing was submitted");
     }
-    assert_eq!(refused(&mut frame, &stage, expected.len()), None, "there are no more barriers than these");
+    assert_eq!(refused(&mut frame, &gpu, expected.len()), None, "there are no more barriers than these");
     assert_ne!(frame.radiosity(0).unwrap(), light, "with all barriers it runs");
 }

@@ -2,17 +2,14 @@
 //! vertex, though a cluster has one list; among occluders there is one order for a whole receiver, by the distance from
 //! its centre in f32, ties by index, and what that differs from an order of each vertex's own is bounded here.
 
-use crate::stage;
-use glam::DVec3;
-use shadow_fields::check::merge::ARITHMETIC;
-use shadow_fields::field::ShadowField;
-use shadow_fields::frame::Frame;
+use crate::common::{Gpu, gpu};
+use crate::stage::{difference, scene, small};
+use glam::{DVec3, Vec3};
+use shadow_fields::check::merge::{ARITHMETIC, against_twin};
 use shadow_fields::lists::gather::{EntityBounds, SceneBounds};
 use shadow_fields::lists::skip::Skip;
-use shadow_fields::merge::twin::{MergeObject, MergeTwin};
 use shadow_fields::scene::Scene;
-use stage::{Stage, scene, small, stage};
-use std::collections::BTreeMap;
+use std::collections::BTreeSet;
 
 /// A patch of one cluster below a light, and below it an occluder on either side, both about as far from the patch as
 /// the light.
@@ -30,131 +27,59 @@ fn patch(occluders: &[[f64; 3]]) -> Scene {
 
 const A: [f64; 3] = [-0.3, 0.94, 0.0];
 const B: [f64; 3] = [0.3, 0.94, 0.0];
-const LIGHT: usize = 1;
 
-/// Puts occluders into an order, given the distance of each.
-type Sort<'s> = dyn Fn(&dyn Fn(usize) -> f64, &mut [usize]) + 's;
-
-/// Light on the patch by the twin, vertex by vertex, the occluders of each in the order that `sorted` gives them; and
-/// how many vertices have which entities, light included, in which order by their own distances.
-fn by_vertex(frame: &Frame, sorted: &Sort<'_>) -> (Vec<[f64; 3]>, BTreeMap<Vec<usize>, usize>) {
-    let scene = frame.scene();
+/// The orders in which vertices of the patch have the other entities by their own distances, light included.
+fn orders(scene: &Scene) -> BTreeSet<Vec<usize>> {
     let placements = scene.at(0.0);
-    let fields: Vec<Option<ShadowField>> = frame
-        .buffers
-        .meshes
-        .iter()
-        .map(|g| g.blocked.as_ref().map(|slot| frame.buffers.field(slot).unwrap()))
-        .collect();
-    let object = |(entity, place): (&shadow_fields::scene::Entity, &shadow_fields::scene::Placement)| {
-        let device_mesh = &frame.buffers.meshes[entity.mesh];
-        let rotation = place.turn();
-        let scale = f64::from(place.scale);
-        MergeObject {
-            centre: place.position.as_dvec3() + rotation * (device_mesh.centre_m * scale),
-            rotation,
-            scale,
-            radius_m: device_mesh.radius_m * scale,
-            albedo_over_pi: (entity.albedo.as_dvec3() / std::f64::consts::PI).to_array(),
-            emission: entity.emission.as_dvec3().to_array(),
-            blocked: fields[entity.mesh].as_ref(),
-            area: device_mesh.blocked.as_ref().map_or(Default::default(), |slot| slot.area),
-            radiance: None,
-            opacity: 1.0,
-            sheet: None,
-        }
+    let order = |vertex: &Vec3| {
+        let mut others: Vec<usize> = (1..placements.len()).collect();
+        others.sort_by(|&a, &b| {
+            let [a, b] = [a, b].map(|j| placements[j].position.distance(*vertex));
+            a.total_cmp(&b)
+        });
+        others
     };
-    let objects: Vec<MergeObject<'_>> = scene.entities.iter().zip(&placements).map(object).collect();
-    let sky = scene.environment.coefficients(4);
-    let mesh = &scene.meshes[0];
-    let mut out = Vec::new();
-    let mut orders = BTreeMap::new();
-    for (position, normal) in mesh.positions.iter().zip(&mesh.normals) {
-        let (position, normal) = (position.as_dvec3() - frame.buffers.meshes[0].centre_m, normal.as_dvec3());
-        let distance = |j: usize| objects[j].centre.distance(objects[0].centre + position);
-        let mut all: Vec<usize> = (1..objects.len()).collect();
-        all.sort_by(|&a, &b| distance(a).total_cmp(&distance(b)).then(a.cmp(&b)));
-        *orders.entry(all).or_default() += 1;
-        let mut occluders: Vec<usize> = (2..objects.len()).collect();
-        sorted(&distance, &mut occluders);
-        let twin = MergeTwin {
-            objects: &objects,
-            receiver: 0,
-            occluders: &occluders,
-            lights: &[LIGHT],
-            sky: Some(&sky),
-            volume: None,
-            positions: &[position],
-            normals: &[normal],
-            transfer: None,
-            bands: 4,
-            skip: small().skip,
-            leaves: &|_, _, _| false,
-        };
-        out.extend(twin.run());
-    }
-    (out, orders)
+    scene.meshes[0].positions.iter().map(order).collect()
 }
 
-/// Near to far from each vertex, ties by index.
-fn own(distance: &dyn Fn(usize) -> f64, occluders: &mut [usize]) {
-    occluders.sort_by(|&a, &b| distance(a).total_cmp(&distance(b)).then(a.cmp(&b)));
-}
-
-/// Largest difference, as a share of the brightest.
-fn apart(found: &[[f32; 3]], expected: &[[f64; 3]]) -> f64 {
-    let pairs = || found.iter().flatten().map(|f| f64::from(*f)).zip(expected.iter().flatten().copied());
-    pairs().map(|(f, e)| (f - e).abs()).fold(0.0, f64::max) / pairs().map(|(_, e)| e).fold(0.0, f64::max)
-}
-
-fn lit(stage: &Stage, occluders: &[[f64; 3]]) -> (Frame, Vec<[f32; 3]>) {
-    let scene = patch(occluders);
-    let mut frame = stage.frame(&scene, small());
-    let light = stage.light(&mut frame, &scene.at(0.0)).swap_remove(0);
+/// Light on the patch, which is that of the twin.
+fn lit(gpu: &Gpu, scene: &Scene) -> Vec<[f32; 3]> {
+    let mut frame = gpu.frame(scene, small());
+    let off = against_twin(&mut frame, &scene.at(0.0)).unwrap();
+    assert!(off < ARITHMETIC, "{off:e}");
+    let light = frame.radiosity(0).unwrap();
     assert_eq!((light.len(), frame.merged().clusters), (64, 1), "one cluster, one list");
-    (frame, light)
+    light
 }
 
 /// One occluder that is nearer than the light to some vertices of a cluster and farther than it from others: each
 /// vertex is right.
 #[test]
 fn before_or_behind_a_light_is_decided_by_the_vertex() {
-    let Some(stage) = stage() else { return };
+    let Some(gpu) = gpu() else { return };
+    let open = lit(&gpu, &patch(&[]));
     for place in [A, B, [0.02, 0.9995, 0.3], [-0.1, 0.995, 0.0]] {
-        let (frame, light) = lit(&stage, &[place]);
-        let (expected, orders) = by_vertex(&frame, &own);
-        assert_eq!(orders.len(), 2, "before the light for some, behind it for others: {orders:?}");
-        assert!(apart(&light, &expected) < ARITHMETIC, "{place:?}: {:e}", apart(&light, &expected));
-        let (without, _) = lit(&stage, &[]);
-        let (open, _) = by_vertex(&without, &own);
-        assert!(apart(&light, &open) > 0.01, "the occluder counts at all");
+        let scene = patch(&[place]);
+        assert_eq!(orders(&scene).len(), 2, "{place:?}: before the light for some, behind it for others");
+        let (apart, brightest) = difference(&lit(&gpu, &scene), &open);
+        assert!(apart > 0.01 * brightest, "the occluder counts at all");
     }
 }
 
 /// Two occluders on either side of the light, equally far from the patch's centre: all six orders but two are met
 /// within the one cluster. Which of them lie before the light is right at each vertex; their products stand in one
-/// order, which is the stated one.
+/// order, by index. A hair nearer, the second comes first; and nobody sees it, so that an order of each vertex's own
+/// would not be seen either.
 #[test]
 fn two_occluders_about_as_far_as_a_light() {
-    let Some(stage) = stage() else { return };
-    let (frame, light) = lit(&stage, &[A, B]);
-    let (expected, orders) = by_vertex(&frame, &own);
-    let from_own = apart(&light, &expected);
-    let (stated, _) = by_vertex(&frame, &|_, occluders| occluders.sort_unstable());
-    let (other, _) = by_vertex(&frame, &|_, occluders| occluders.reverse());
-    let [stated, other] = [stated, other].map(|expected| apart(&light, &expected));
-    assert!(orders.len() >= 4, "{orders:?}");
-    assert!(stated < ARITHMETIC, "at a tie, by index: {stated:e}");
-    assert!(other > 2.0 * ARITHMETIC, "the order can be told apart: {other:e}");
+    let Some(gpu) = gpu() else { return };
+    let tie = patch(&[A, B]);
+    assert!(orders(&tie).len() >= 4, "{:?}", orders(&tie));
+    let [first, second] = [tie, patch(&[A, [B[0], B[1] - 1e-6, B[2]]])].map(|scene| lit(&gpu, &scene));
+    let (step, brightest) = difference(&second, &first);
     // Products truncated to four bands do not quite commute.
-    assert!(from_own < 2e-3, "{from_own:e}");
-
-    // A hair nearer, the second comes first; and nobody sees it.
-    let (frame, turned) = lit(&stage, &[A, [B[0], B[1] - 1e-6, B[2]]]);
-    let (expected, _) = by_vertex(&frame, &|_, occluders| occluders.reverse());
-    assert!(apart(&turned, &expected) < ARITHMETIC, "by distance from the receiver's centre");
-    let (step, brightest) = stage::difference(&turned, &light);
     assert!(step < 2e-3 * brightest, "{step} of {brightest}");
+    assert!(f64::from(step) > 2.0 * ARITHMETIC * f64::from(brightest), "the order can be told apart: {step:e}");
 }
 
 /// The key is in f32: what differs by less comes as equal, and by index, for the merge, for its twin and for the exact

@@ -1,7 +1,6 @@
 //! Self-visibility: closed forms, the shader's lookup against Rust's, direct light against rays.
 
-use crate::common;
-use common::{generate, gpu, parse};
+use crate::common::{generate, gpu, parse};
 use glam::{DVec3, Vec3};
 use shadow_fields::asset::Mesh;
 use shadow_fields::bake::surfaces::{BakedSurface, GroupPlan};
@@ -74,15 +73,18 @@ fn the_edge_of_a_wall_is_a_great_circle() {
 }
 
 #[test]
-fn a_ball_leaves_all_free_outside_and_nothing_inside() {
+fn convex_meshes_leave_all_free_outside_and_nothing_inside() {
+    for mesh in [generate::sphere(0.5, 2), generate::cuboid(Vec3::new(1.0, 0.5, 2.0), 4)] {
+        let surface = bake(&mesh);
+        let nothing = surface.transfer.is_none() && surface.self_visibility.is_none();
+        assert!(mesh.is_convex() && nothing, "{}: nothing is blocked, so nothing is kept", mesh.name);
+    }
     let ball = generate::sphere(0.5, 2);
-    let all = |maps: Vec<u8>, angle| {
-        maps.chunks_exact(BYTES).all(|map| map[..NODES].iter().all(|byte| *byte == encode_angle(angle)))
-    };
-    assert!(bake(&ball).self_visibility.is_none(), "nothing is blocked, so nothing is kept");
     let inwards = ball.triangles.iter().map(|t| [t[0], t[2], t[1]]).collect();
-    let room = Mesh::new("room", ball.positions.clone(), Vec::new(), None, inwards).unwrap();
-    assert!(all(maps(&room), -LIMIT_RAD));
+    let room = Mesh::new("room", ball.positions, Vec::new(), None, inwards).unwrap();
+    assert!(
+        maps(&room).chunks_exact(BYTES).flat_map(|map| &map[..NODES]).all(|byte| *byte == encode_angle(-LIMIT_RAD))
+    );
 }
 
 const LOOKUP: &str = r#"#version 460
@@ -149,8 +151,8 @@ fn a_shader_finds_what_rust_finds() {
     }
 }
 
-/// Directions over a round light, equal shares of its solid angle.
-fn light_rays(direction: DVec3, angle: f64, count: usize, turned: f64) -> impl Iterator<Item = DVec3> {
+/// Directions over a round light, equal shares of its solid angle; `turned` by an angle about its middle.
+pub fn light_rays(direction: DVec3, angle: f64, count: usize, turned: f64) -> impl Iterator<Item = DVec3> {
     let (a, b) = direction.any_orthonormal_pair();
     (0..count).map(move |i| {
         let cosine = 1.0 - (1.0 - angle.cos()) * (i as f64 + 0.5) / count as f64;

@@ -1,13 +1,12 @@
 //! Sheets against rays: grounds, walls and ceilings that are rectangles, and what moves past them.
 
-use crate::common::relative_rms;
-use crate::stage;
+use crate::common::{Gpu, gpu, relative_rms};
+use crate::stage::{scene, small};
 use shadow_fields::bake::{self, Quality};
 use shadow_fields::check::merge::ROOM;
 use shadow_fields::frame;
 use shadow_fields::scene::{Lights, Scene};
 use shadow_fields::truth::{RayCast, Vertex, World};
-use stage::{Stage, scene, small, stage};
 
 /// The fields that the command line bakes by default, in f32, of meshes as they are.
 fn defaults(lights: Lights) -> frame::Options {
@@ -26,32 +25,41 @@ fn truth(scene: &Scene, time_s: f64, entity: usize, every: usize, rays: u32) -> 
 }
 
 /// Relative RMS of an entity's light against rays.
-fn error(stage: &Stage, frame: &mut frame::Frame, scene: &Scene, time_s: f64, entity: usize, every: usize) -> f64 {
-    let light = stage.light(frame, &scene.at(time_s)).swap_remove(entity);
+fn error(gpu: &Gpu, frame: &mut frame::Frame, scene: &Scene, time_s: f64, entity: usize, every: usize) -> f64 {
+    let light = gpu.light(frame, &scene.at(time_s)).swap_remove(entity);
     let (chosen, truth) = truth(scene, time_s, entity, every, 1024);
     relative_rms(chosen.iter().zip(truth).map(|(&v, truth)| (f64::from(light[v][0]), truth)))
+}
+
+/// Largest root mean square, over vertices, of a step that neither neighbour's slope explains.
+fn pop(walk: &[Vec<[f32; 3]>]) -> f64 {
+    let bend = |step: &[Vec<[f32; 3]>]| {
+        let at = |v: usize| f64::from(step[2][v][0] - 2.0 * step[1][v][0] + step[0][v][0]).powi(2);
+        ((0..step[0].len()).map(at).sum::<f64>() / step[0].len() as f64).sqrt()
+    };
+    walk.windows(3).map(bend).fold(0.0, f64::max)
 }
 
 const WHITE: &str = "albedo = [1, 1, 1]";
 
 #[test]
 fn an_object_on_a_ground_is_lit_as_by_rays() {
-    let Some(stage) = stage() else { return };
+    let Some(gpu) = gpu() else { return };
     let text = format!(
         "environment = {{ uniform = [1, 1, 1] }}\n[[mesh]]\nname = \"floor\"\nplane = {{ size_m = 6, cells = 2 }}\n\
          [[mesh]]\nname = \"pot\"\nfile = \"assets/meshes/teapot.obj\"\n\
          [[entity]]\nmesh = \"floor\"\n[[entity]]\nmesh = \"pot\"\nscale = 0.5\n{WHITE}\n"
     );
     let scene = scene(&text);
-    let mut frame = stage.frame(&scene, defaults(Lights::Sharp));
-    let found = error(&stage, &mut frame, &scene, 0.0, 1, 3);
+    let mut frame = gpu.frame(&scene, defaults(Lights::Sharp));
+    let found = error(&gpu, &mut frame, &scene, 0.0, 1, 3);
     assert!(found < 0.006, "{found}");
 }
 
 /// A ball rolls along a wall, then off the edge of its ground, in steps of 2 cm, under a sky that is brighter above.
 #[test]
 fn a_ball_along_a_wall_and_over_an_edge() {
-    let Some(stage) = stage() else { return };
+    let Some(gpu) = gpu() else { return };
     let text = format!(
         "environment = {{ gradient = {{ radiance = [1, 1, 1] }} }}\n\
          [[mesh]]\nname = \"plane\"\nplane = {{ size_m = 4, cells = 2 }}\n\
@@ -61,40 +69,35 @@ fn a_ball_along_a_wall_and_over_an_edge() {
          [[entity]]\nmesh = \"ball\"\nposition = [0, 0.3, 0]\n{WHITE}\nmotion = [{{ bob = {{ amplitude_m = 2.5, period_s = 4, axis = [1, 0, 0] }} }}]\n"
     );
     let scene = scene(&text);
-    let mut frame = stage.frame(&scene, defaults(Lights::Sharp));
+    let mut frame = gpu.frame(&scene, defaults(Lights::Sharp));
     let mut worst = 0.0_f64;
-    let mut pop = 0.0_f64;
     let mut walk: Vec<Vec<[f32; 3]>> = Vec::new();
     for step in 0..=100 {
         let time_s = f64::from(step) / 100.0;
-        walk.push(stage.light(&mut frame, &scene.at(time_s)).swap_remove(2));
+        walk.push(gpu.light(&mut frame, &scene.at(time_s)).swap_remove(2));
         if step % 10 == 0 {
-            let found = error(&stage, &mut frame, &scene, time_s, 2, 3);
+            let found = error(&gpu, &mut frame, &scene, time_s, 2, 3);
             worst = worst.max(found);
-        }
-        // A step that neither neighbour's slope explains. Of single vertices near the ground's edge it is large in truth.
-        if let [.., a, b, c] = &walk[..] {
-            let bend = |v: usize| f64::from(c[v][0] - 2.0 * b[v][0] + a[v][0]).powi(2);
-            pop = pop.max(((0..a.len()).map(bend).sum::<f64>() / a.len() as f64).sqrt());
         }
     }
     assert!(worst < 0.03, "{worst}");
-    assert!(pop < 0.02, "{pop}");
+    // Of single vertices near the ground's edge it is large in truth.
+    assert!(pop(&walk) < 0.02, "{}", pop(&walk));
 }
 
 /// A ring between walls, by single fields and by their volume; and out of it, in steps of 1 cm.
 #[test]
 fn what_moves_in_a_room_sees_all_its_walls_at_once() {
-    let Some(stage) = stage() else { return };
+    let Some(gpu) = gpu() else { return };
     let scene = scene(ROOM);
     let ring = scene.entities.len() - 1;
     let with = |groups: bool| {
         let options = defaults(Lights::Sharp);
         frame::Options { bake: bake::Options { groups, ..options.bake }, ..options }
     };
-    let errors = |frame: &mut frame::Frame| [0.0, 0.4, 3.2].map(|t| error(&stage, frame, &scene, t, ring, 3));
-    let mut alone = stage.frame(&scene, with(false));
-    let mut frame = stage.frame(&scene, with(true));
+    let errors = |frame: &mut frame::Frame| [0.0, 0.4, 3.2].map(|t| error(&gpu, frame, &scene, t, ring, 3));
+    let mut alone = gpu.frame(&scene, with(false));
+    let mut frame = gpu.frame(&scene, with(true));
     let found = errors(&mut frame);
     let by_fields = errors(&mut alone);
     assert!(found.iter().all(|error| *error < 0.1), "{found:?}");
@@ -103,20 +106,15 @@ fn what_moves_in_a_room_sees_all_its_walls_at_once() {
     let mut walk: Vec<Vec<[f32; 3]>> = Vec::new();
     for _ in 0..60 {
         placements[ring].position.z += 0.01;
-        walk.push(stage.light(&mut frame, &placements).swap_remove(ring));
+        walk.push(gpu.light(&mut frame, &placements).swap_remove(ring));
     }
-    let mut pop = 0.0_f64;
-    for step in walk.windows(3) {
-        let bend = |v: usize| f64::from(step[2][v][0] - 2.0 * step[1][v][0] + step[0][v][0]).powi(2);
-        pop = pop.max(((0..step[0].len()).map(bend).sum::<f64>() / step[0].len() as f64).sqrt());
-    }
-    assert!(pop < 0.01, "{pop}");
+    assert!(pop(&walk) < 0.01, "{}", pop(&walk));
 }
 
 /// Balls of light beyond a wall, one that the wall's rim cuts, one below a ground, and a lamp that lies on a ceiling.
 #[test]
 fn sheets_hide_sharp_lights() {
-    let Some(stage) = stage() else { return };
+    let Some(gpu) = gpu() else { return };
     let lit = |rest: &str, lights: Lights| {
         let text = format!(
             "[[mesh]]\nname = \"plane\"\nplane = {{ size_m = 2, cells = 1 }}\n\
@@ -126,9 +124,9 @@ fn sheets_hide_sharp_lights() {
              [[entity]]\nmesh = \"field\"\n{WHITE}\n{rest}"
         );
         let scene = scene(&text);
-        let mut frame = stage.frame(&scene, defaults(lights));
-        let brightest = stage.light(&mut frame, &scene.at(0.0))[0].iter().map(|v| v[0]).fold(0.0, f32::max);
-        (error(&stage, &mut frame, &scene, 0.0, 0, 2), brightest)
+        let mut frame = gpu.frame(&scene, defaults(lights));
+        let brightest = gpu.light(&mut frame, &scene.at(0.0))[0].iter().map(|v| v[0]).fold(0.0, f32::max);
+        (error(&gpu, &mut frame, &scene, 0.0, 0, 2), brightest)
     };
     let glow = "receives = false\nemission = [9, 9, 9]";
     let wall = "[[entity]]\nmesh = \"plane\"\nposition = [0.13, 0.4, 0]\nscale = 0.4\nreceives = false\n\

@@ -1,16 +1,15 @@
 //! What is not done: an unmoved scene merges nothing, and one in which something moves comes to the bits of a full
 //! merge; what is dropped as small stays within its bound.
 
-use crate::common::parse;
-use crate::stage;
+use crate::common::{gpu, parse};
+use crate::stage::{at, difference, jostled, scene, small};
 use glam::{Quat, Vec3};
 use shadow_fields::asset::Mesh;
 use shadow_fields::frame;
 use shadow_fields::lists::skip::{Skip, TABLE};
 use shadow_fields::scene::{Placement, Scene};
 use shadow_fields::truth::raycast::RayCast;
-use shadow_fields::truth::{RayMeshes, Vertex, World};
-use stage::{at, scene, small, stage};
+use shadow_fields::truth::{Vertex, World};
 use std::fmt::Write;
 
 /// Balls and rings on a floor, some of them lights, on a grid with `step_m` between them.
@@ -38,21 +37,14 @@ fn town(edge: usize, step_m: f32, lights: usize) -> Scene {
     scene(&text)
 }
 
-fn jostled(place: &Placement, rng: &mut fastrand::Rng, reach_m: f32) -> Placement {
-    let mut step = || (rng.f32() - 0.5) * 2.0 * reach_m;
-    let position = place.position + Vec3::new(step(), 0.1 * step(), step());
-    let rotation = (Quat::from_rotation_y(step()) * place.rotation).normalize();
-    Placement { position, rotation, scale: place.scale }
-}
-
 #[test]
 fn what_moves_is_merged_again_to_the_same_bits() {
-    let Some(stage) = stage() else { return };
+    let Some(gpu) = gpu() else { return };
     let scene = town(8, 4.0, 4);
     for eps in [1e-3, 0.0] {
         let options = frame::Options { eps, ..small() };
-        let mut kept = stage.frame(&scene, options);
-        let mut anew = stage.frame(&scene, frame::Options { skip: Skip::without("unmoved"), ..options });
+        let mut kept = gpu.frame(&scene, options);
+        let mut anew = gpu.frame(&scene, frame::Options { skip: Skip::without("unmoved"), ..options });
         let mut placements = scene.at(0.0);
         let mut rng = fastrand::Rng::with_seed(3);
         let (mut merged, mut all) = (0, 0);
@@ -69,8 +61,8 @@ fn what_moves_is_merged_again_to_the_same_bits() {
             for &j in &movers {
                 placements[j] = jostled(&placements[j], &mut rng, if round % 2 == 0 { 0.2 } else { 8.0 });
             }
-            let found = stage.light(&mut kept, &placements);
-            let expected = stage.light(&mut anew, &placements);
+            let found = gpu.light(&mut kept, &placements);
+            let expected = gpu.light(&mut anew, &placements);
             assert_eq!(anew.merged().merged_clusters, anew.merged().clusters);
             let same = |a: &[Vec<[f32; 3]>], b: &[Vec<[f32; 3]>]| {
                 let bits = |v: &[Vec<[f32; 3]>]| v.iter().flatten().flatten().map(|c| c.to_bits()).collect::<Vec<_>>();
@@ -96,14 +88,12 @@ fn what_moves_is_merged_again_to_the_same_bits() {
 /// A merge that did not run leaves nothing behind that a later one would take for done.
 #[test]
 fn a_refused_frame_is_done_again() {
-    let Some(stage) = stage() else { return };
+    let Some(gpu) = gpu() else { return };
     let scene = town(3, 2.0, 1);
-    let mut frame = stage.frame(&scene, small());
+    let mut frame = gpu.frame(&scene, small());
     let placements = scene.at(0.0);
-    stage.gpu.device.omit_barrier(Some(0));
-    assert!(frame.render(&placements, Some(1.0)).is_err());
-    stage.gpu.device.omit_barrier(None);
-    stage.gpu.device.take_validation_messages();
+    assert!(gpu.without_barrier(0, || frame.render(&placements, Some(1.0))).is_err());
+    gpu.device.take_validation_messages();
     let passes = frame.render(&placements, Some(1.0)).unwrap();
     assert!(passes.iter().any(|t| t.pass == "merge"), "{passes:?}");
     let passes = frame.render(&placements, Some(1.0)).unwrap();
@@ -116,16 +106,16 @@ fn a_refused_frame_is_done_again() {
 /// Switches that say they change no number.
 #[test]
 fn exact_skips_change_nothing() {
-    let Some(stage) = stage() else { return };
+    let Some(gpu) = gpu() else { return };
     let scene = town(6, 1.1, 5);
     let placements = scene.at(0.0);
-    let mut all = stage.frame(&scene, small());
-    let expected = stage.light(&mut all, &placements);
+    let mut all = gpu.frame(&scene, small());
+    let expected = gpu.light(&mut all, &placements);
     let entries = all.merged().merged_entries;
     let approximate = ["horizon", "cones", "caps", "static"];
     for name in TABLE.iter().map(|row| row.name).filter(|name| !approximate.contains(name)) {
-        let mut frame = stage.frame(&scene, frame::Options { skip: Skip::without(name), ..small() });
-        assert_eq!(stage.light(&mut frame, &placements), expected, "without {name}");
+        let mut frame = gpu.frame(&scene, frame::Options { skip: Skip::without(name), ..small() });
+        assert_eq!(gpu.light(&mut frame, &placements), expected, "without {name}");
         assert!(name != "behind" || frame.merged().merged_entries > entries);
     }
 }
@@ -133,7 +123,7 @@ fn exact_skips_change_nothing() {
 /// A lamp that is painted black is no light.
 #[test]
 fn a_light_of_zeros_is_left_off() {
-    let Some(stage) = stage() else { return };
+    let Some(gpu) = gpu() else { return };
     let mut scene = scene(
         "[[mesh]]\nname = \"floor\"\nplane = { size_m = 6, cells = 31 }\n\
          [[mesh]]\nname = \"lamp\"\ncuboid = { size_m = [1, 0.2, 1], cells = 2 }\n\
@@ -143,8 +133,8 @@ fn a_light_of_zeros_is_left_off() {
     let black = Some(vec![Vec3::ZERO; lamp.positions.len()]);
     let painted = Mesh::new("lamp", lamp.positions.clone(), lamp.normals.clone(), black, lamp.triangles.clone());
     scene.meshes[1] = painted.unwrap().into();
-    let mut frame = stage.frame(&scene, small());
-    let light = stage.light(&mut frame, &scene.at(0.0));
+    let mut frame = gpu.frame(&scene, small());
+    let light = gpu.light(&mut frame, &scene.at(0.0));
     assert!(light.iter().flatten().flatten().all(|c| *c == 0.0) && frame.merged().merged_entries == 0);
 }
 
@@ -152,15 +142,15 @@ fn a_light_of_zeros_is_left_off() {
 /// second receiver, for which it is.
 #[test]
 fn what_no_receiver_sees_is_not_baked() {
-    let Some(stage) = stage() else { return };
+    let Some(gpu) = gpu() else { return };
     let ball_and_ring = "environment = { uniform = [0.4, 0.5, 0.6] }\n\
          [[mesh]]\nname = \"ball\"\nsphere = { radius_m = 0.3, subdivisions = 2 }\n\
          [[mesh]]\nname = \"ring\"\ntorus = { major_m = 0.3, minor_m = 0.1, segments = 12, sides = 6 }\n\
          [[entity]]\nmesh = \"ball\"\n[[entity]]\nmesh = \"ring\"\nposition = [0, 0.5, 0]\nreceives = false\n";
     let (scene, pair) = (scene(ball_and_ring), scene(&format!("{ball_and_ring}{FAR_PATCH}")));
-    let mut with = stage.frame(&scene, small());
-    let mut seen = stage.frame(&pair, small());
-    let (alone, beside) = (stage.light(&mut with, &scene.at(0.0)), stage.light(&mut seen, &pair.at(0.0)));
+    let mut with = gpu.frame(&scene, small());
+    let mut seen = gpu.frame(&pair, small());
+    let (alone, beside) = (gpu.light(&mut with, &scene.at(0.0)), gpu.light(&mut seen, &pair.at(0.0)));
     assert_eq!(alone[0], beside[0]);
     let bytes = [&with, &seen].map(|frame| frame.buffers.fields.size_bytes);
     assert_eq!(2 * bytes[0], bytes[1], "one field of two alike is baked");
@@ -174,7 +164,7 @@ const FAR_PATCH: &str = "[[mesh]]\nname = \"patch\"\nplane = { size_m = 1, cells
 /// bound, and so is what the merge itself changes.
 #[test]
 fn what_is_dropped_stays_within_its_bound() {
-    let Some(stage) = stage() else { return };
+    let Some(gpu) = gpu() else { return };
     let mut town = town(14, 1.5, 7);
     let mut patch = town.data.clone();
     // A small patch of floor: one cluster, so that one list holds for all its vertices.
@@ -186,18 +176,16 @@ fn what_is_dropped_stays_within_its_bound() {
     }
     town = parse(&patch.to_toml().unwrap());
     let placements = town.at(0.0);
-    let mut full = stage.frame(&town, small());
-    let exact = stage.light(&mut full, &placements);
+    let mut full = gpu.frame(&town, small());
+    let exact = gpu.light(&mut full, &placements);
     let all = full.listed(&placements, 0);
-    let shapes = RayMeshes::new(&town);
-    let world = World::new(&town, &shapes, &placements);
     let vertices: Vec<Vertex> = (0..exact[0].len()).map(|index| Vertex { entity: 0, index }).collect();
     let cast = RayCast { rays: 1 << 13, ..Default::default() };
-    let truth = cast.run(&world, &vertices);
+    let truth = cast.run(&World::of(&town, &placements), &vertices);
     for eps in [1e-3, 5e-3, 2e-2] {
-        let mut frame = stage.frame(&town, frame::Options { eps, ..small() });
-        let light = stage.light(&mut frame, &placements);
-        let (worst, brightest) = stage::difference(&light[0], &exact[0]);
+        let mut frame = gpu.frame(&town, frame::Options { eps, ..small() });
+        let light = gpu.light(&mut frame, &placements);
+        let (worst, brightest) = difference(&light[0], &exact[0]);
         // The same town without what the list leaves out, by rays.
         let listed = frame.listed(&placements, 0);
         let mut bare = town.clone();
@@ -205,7 +193,7 @@ fn what_is_dropped_stays_within_its_bound() {
             entity.occludes &= listed.contains(&j);
             entity.emits &= listed.contains(&j);
         }
-        let without = cast.run(&World::new(&bare, &shapes, &placements), &vertices);
+        let without = cast.run(&World::of(&bare, &placements), &vertices);
         let pairs = truth.iter().zip(&without);
         let by_rays = pairs
             .flat_map(|(a, b)| (0..3).map(move |c| (a.radiosity[c] - b.radiosity[c]).abs()))
@@ -223,7 +211,7 @@ fn what_is_dropped_stays_within_its_bound() {
 /// caps: the light of every vertex goes on as smoothly as with fields alone, and stays near to it.
 #[test]
 fn nothing_pops_as_fields_become_caps() {
-    let Some(stage) = stage() else { return };
+    let Some(gpu) = gpu() else { return };
     for shape in [
         "sphere = { radius_m = 0.5, subdivisions = 2 }",
         "torus = { major_m = 0.35, minor_m = 0.15, segments = 16, sides = 8 }",
@@ -237,8 +225,8 @@ fn nothing_pops_as_fields_become_caps() {
         // Fine enough that what a lookup is off by does not hide what caps change.
         let bake = shadow_fields::bake::Options { face_px: 32, lattice: "cube:12x7".parse().unwrap(), ..small().bake };
         let options = frame::Options { bake, ..small() };
-        let mut caps = stage.frame(&scene, options);
-        let mut fields = stage.frame(&scene, frame::Options { skip: Skip::without("caps"), ..options });
+        let mut caps = gpu.frame(&scene, options);
+        let mut fields = gpu.frame(&scene, frame::Options { skip: Skip::without("caps"), ..options });
         let mut walk = Vec::new();
         let mut apart = 0.0_f32;
         let mut brightest = 0.0;
@@ -248,9 +236,9 @@ fn nothing_pops_as_fields_become_caps() {
             let turn = Quat::from_axis_angle(Vec3::new(0.6, 0.0, 0.8), 0.02 * i as f32);
             let thing = Placement { rotation: turn, ..at(0.8 * d, 0.6 * d, 0.2) };
             let placements = [at(0.0, 0.0, 0.0), thing, at(5.0, 4.0, 0.5)];
-            let by_caps = stage.light(&mut caps, &placements).swap_remove(0);
-            let by_fields = stage.light(&mut fields, &placements).swap_remove(0);
-            let (far, bright) = stage::difference(&by_caps, &by_fields);
+            let by_caps = gpu.light(&mut caps, &placements).swap_remove(0);
+            let by_fields = gpu.light(&mut fields, &placements).swap_remove(0);
+            let (far, bright) = difference(&by_caps, &by_fields);
             (apart, brightest) = (apart.max(far), bright);
             kinds.insert(caps.merged().merged_entries);
             walk.push([by_caps, by_fields]);
@@ -271,20 +259,20 @@ fn nothing_pops_as_fields_become_caps() {
 /// As an occluder passes eps nothing changes by more than it.
 #[test]
 fn nothing_pops_by_more_than_eps() {
-    let Some(stage) = stage() else { return };
+    let Some(gpu) = gpu() else { return };
     let scene = scene(
         "environment = { uniform = [1, 1, 1] }\n[[mesh]]\nname = \"floor\"\nplane = { size_m = 1, cells = 7 }\n\
          [[mesh]]\nname = \"ball\"\nsphere = { radius_m = 0.5, subdivisions = 2 }\n[[entity]]\nmesh = \"floor\"\n[[entity]]\nmesh = \"ball\"\n",
     );
     let eps = 4e-3;
-    let mut frame = stage.frame(&scene, frame::Options { eps, ..small() });
+    let mut frame = gpu.frame(&scene, frame::Options { eps, ..small() });
     let (mut before, mut largest, mut dropped): (Option<Vec<[f32; 3]>>, f32, bool) = (None, 0.0, false);
     for i in 0..120 {
         let placements = [at(0.0, 0.0, 0.0), at(4.0 + 0.02 * i as f32, 1.0, 0.3)];
-        let light = stage.light(&mut frame, &placements).swap_remove(0);
+        let light = gpu.light(&mut frame, &placements).swap_remove(0);
         dropped |= !frame.listed(&placements, 0).contains(&1);
         if let Some(before) = before.replace(light.clone()) {
-            largest = largest.max(stage::difference(&light, &before).0);
+            largest = largest.max(difference(&light, &before).0);
         }
     }
     assert!(dropped && largest <= eps, "{largest}");

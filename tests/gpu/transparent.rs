@@ -1,6 +1,7 @@
 //! What lets light through, everywhere or by its holes.
 
-use crate::stage;
+use crate::common::gpu;
+use crate::stage::{difference, scene, small};
 use glam::{Vec2, Vec3};
 use shadow_fields::asset::Mesh;
 use shadow_fields::asset::environment::EnvironmentData;
@@ -10,7 +11,6 @@ use shadow_fields::draw::Antialias;
 use shadow_fields::scene::data::EntityData;
 use shadow_fields::scene::{Albedo, Scene};
 use shadow_fields::{bake, frame};
-use stage::{difference, scene, small, stage};
 use std::sync::Arc;
 
 const SKY: &str = "environment = { uniform = [1, 1, 1] }\n";
@@ -23,7 +23,7 @@ const FLOOR: &str = "[[mesh]]\nname = \"floor\"\nplane = { size_m = 4, cells = 2
 /// One occluder of any kind: what it leaves is between nothing and all of what it blocks, by its opacity.
 #[test]
 fn glass_takes_its_share() {
-    let Some(stage) = stage() else { return };
+    let Some(gpu) = gpu() else { return };
     for mesh in ["ball", "box", "pane"] {
         for (what, light, sky) in [("sky", "", SKY), ("lamp", LAMP, "")] {
             for groups in [false, true] {
@@ -32,7 +32,7 @@ fn glass_takes_its_share() {
                     let bake = bake::Options { groups, ..small().bake };
                     let scene = scene(&format!("{sky}{FLOOR}{pane}{light}"));
                     let options = frame::Options { bake, ..small() };
-                    stage.light(&mut stage.frame(&scene, options), &scene.at(0.0)).swap_remove(0)
+                    gpu.light(&mut gpu.frame(&scene, options), &scene.at(0.0)).swap_remove(0)
                 };
                 // An opaque one of a group would be in the floor's own visibility.
                 let [open, glass, dense] = ["occludes = false", "opacity = 0.3", "opacity = 0.999"].map(lit);
@@ -51,7 +51,7 @@ fn glass_takes_its_share() {
 
 #[test]
 fn glass_is_drawn_over_what_lies_behind_it() {
-    let Some(stage) = stage() else { return };
+    let Some(gpu) = gpu() else { return };
     let pane = "[[mesh]]\nname = \"pane\"\ncuboid = { size_m = [2, 2, 0.1], cells = 1 }\n[[entity]]\nmesh = \"pane\"\n\
         position = [0, 0, 1]\nopacity = 0.25\nemission = [0, 0, 0.1]\nemits = false\noccludes = false\n";
     let text = format!(
@@ -60,7 +60,7 @@ fn glass_is_drawn_over_what_lies_behind_it() {
     );
     let scene = scene(&text);
     for antialias in [Antialias::Samples, Antialias::Outlines, Antialias::None] {
-        let mut frame = stage.frame(&scene, frame::Options { size: [64, 64], antialias, ..small() });
+        let mut frame = gpu.frame(&scene, frame::Options { size: [64, 64], antialias, ..small() });
         frame.render(&scene.at(0.0), Some(1.0)).unwrap();
         let picture = frame.picture();
         let middle = Vec3::from_slice(&picture[3 * (32 * 64 + 32)..][..3]);
@@ -102,13 +102,13 @@ fn half_of_a_square(masked: bool) -> Scene {
 /// By rays where nothing moves, else by what is captured of the shape without its holes.
 #[test]
 fn light_passes_holes() {
-    let Some(stage) = stage() else { return };
+    let Some(gpu) = gpu() else { return };
     for (groups, limit) in [(true, 0.06), (false, 0.12)] {
         let lit = |masked: bool| {
             let scene = half_of_a_square(masked);
             let bake = bake::Options { groups, ..bake::Options::default() };
-            let mut frame = stage.frame(&scene, frame::Options { bake, ..small() });
-            stage.light(&mut frame, &scene.at(0.0)).swap_remove(0)
+            let mut frame = gpu.frame(&scene, frame::Options { bake, ..small() });
+            gpu.light(&mut frame, &scene.at(0.0)).swap_remove(0)
         };
         let (off, most) = difference(&lit(true), &lit(false));
         assert!(off < limit * most, "groups {groups}: {off} of {most}");

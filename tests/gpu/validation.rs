@@ -1,28 +1,12 @@
 //! Those who watch are watched: the validation layer hears a hazard, and the tracker objects to every barrier
 //! that is left out.
 
-use crate::common::{Gpu, generate, gpu, library, report};
+use crate::common::{Gpu, generate, gpu, report};
+use shadow_fields::bake;
 use shadow_fields::bake::assemble::Assemble;
-use shadow_fields::bake::{self, Baker};
 use shadow_fields::field::{FieldKind, Storage};
-use shadow_fields::gpu::{Access, Buffer, BufferKind, Commands, Device};
+use shadow_fields::gpu::{Access, Buffer, BufferKind, Commands};
 use shadow_fields::{Error, Result};
-
-/// Leaves out a barrier of every recording until it is dropped.
-struct Omission<'d>(&'d Device);
-
-impl<'d> Omission<'d> {
-    fn new(device: &'d Device, index: usize) -> Self {
-        device.omit_barrier(Some(index));
-        Omission(device)
-    }
-}
-
-impl Drop for Omission<'_> {
-    fn drop(&mut self) {
-        self.0.omit_barrier(None);
-    }
-}
 
 fn buffer(gpu: &Gpu, name: &str, kind: BufferKind) -> Buffer {
     Buffer::new(&gpu.device, name, kind, 1024).unwrap()
@@ -86,14 +70,11 @@ fn every_barrier_of_a_chain_is_missed() {
         &["chain", "host copy", "pass third", "host", "HostRead"],
     ];
     for (index, words) in named.iter().enumerate() {
-        let omission = Omission::new(&gpu.device, index);
-        objection(chain(&gpu), words);
-        drop(omission);
+        objection(gpu.without_barrier(index, || chain(&gpu)), words);
         let heard = gpu.device.take_validation_messages().len();
         report(&format!("barrier {index} left out: the tracker objects; the layer said {heard} things"));
     }
-    let _none = Omission::new(&gpu.device, 3);
-    assert_eq!(chain(&gpu).unwrap(), good, "there is no fourth barrier");
+    assert_eq!(gpu.without_barrier(3, || chain(&gpu)).unwrap(), good, "there is no fourth barrier");
 }
 
 #[test]
@@ -102,19 +83,14 @@ fn the_barrier_of_a_bake_batch_is_missed() {
     let mesh = generate::sphere(1.0, 1);
     for kind in [FieldKind::Occlusion, FieldKind::Radiance] {
         let options = bake::Options { lattice: "cube:2x3".parse().unwrap(), face_px: 16, ..Default::default() };
-        let bake = || {
-            let header = bake::header(&mesh, kind, &options);
-            Baker::new(&gpu.device, &library()).field(&mesh, header, &|_, _| ())
-        };
+        let bake = || gpu.baker().field(&mesh, bake::header(&mesh, kind, &options), &|_, _| ());
         bake().unwrap();
         assert_eq!(gpu.device.take_validation_messages(), Vec::<String>::new());
         let atlas: &[&str] = &["bake batch", "capture atlas", "pass capture", "pass project"];
         let texels: &[&str] = &["bake batch", "capture texels", "pass capture", "TransferRead"];
         let computed = kind == FieldKind::Occlusion && gpu.device.info.is_software();
         for (index, words) in if computed { vec![texels, atlas] } else { vec![atlas] }.into_iter().enumerate() {
-            let omission = Omission::new(&gpu.device, index);
-            objection(bake(), words);
-            drop(omission);
+            objection(gpu.without_barrier(index, bake), words);
             let _ = gpu.device.take_validation_messages();
         }
         // Nothing that fails leaves the device in disorder.

@@ -4,41 +4,17 @@ use crate::root;
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
-/// A module may use only modules that stand before it.
+/// Modules in the order of the table in `lib.rs`. A module may use only modules that stand before it.
 ///
 /// `field` stands before `shaders` because a shader's STRIDE is the stride of stored channels, and before `asset` and
 /// `bake` because it is plain data; `scene_buffers` stands behind the passes because it keeps what each of them reads
 /// in its form.
-const ORDER: &[&str] = &[
-    "error",
-    "files",
-    "text",
-    "sh",
-    "layout",
-    "gpu",
-    "field",
-    "shaders",
-    "asset",
-    "scene",
-    "bake",
-    "lists",
-    "merge",
-    "sharp",
-    "bounce",
-    "gloss",
-    "draw",
-    "scene_buffers",
-    "frame",
-    "renderer",
-    "truth",
-    "check",
-    "bench",
-    "farm",
-    "view",
-    "app",
-    "prelude",
-    "main",
-];
+fn order() -> Vec<String> {
+    let table = text(Path::new("src/lib.rs"));
+    let rows = table.lines().filter_map(|line| line.strip_prefix("//! | ")?.split(" | ").next());
+    let names = rows.flat_map(|cell| cell.split('`').skip(1).step_by(2)).chain(["prelude", "main"]);
+    names.map(str::to_owned).collect()
+}
 
 /// The only modules that `gpu` may use: it knows nothing of what it is for.
 const GPU_USES: &[&str] = &["error", "files"];
@@ -121,6 +97,8 @@ fn module(path: &Path) -> (String, usize) {
 
 #[test]
 fn modules_use_only_what_stands_above_them() {
+    let order = order();
+    let place = |name: &str| order.iter().position(|module| module == name);
     let mut seen = BTreeSet::new();
     for path in files("src", &["rs"]) {
         let (own, depth) = module(&path);
@@ -128,18 +106,18 @@ fn modules_use_only_what_stands_above_them() {
         if own == "bin" || own == "lib" {
             continue;
         }
-        let place = ORDER.iter().position(|m| *m == own).unwrap_or_else(|| panic!("{}: no layer", path.display()));
+        let own_place = place(&own).unwrap_or_else(|| panic!("{}: no layer", path.display()));
         seen.insert(own.clone());
         let code = code(&text(&path));
         let mut used = names_after(&code, "crate::");
         let up = names_after(&code, &"super::".repeat(depth));
-        used.extend(up.into_iter().filter(|name| ORDER.contains(&name.as_str())));
+        used.extend(up);
         if own == "main" {
             continue;
         }
-        for name in used.iter().filter(|name| **name != own && ORDER.contains(&name.as_str())) {
-            let other = ORDER.iter().position(|m| m == name).unwrap();
-            assert!(other < place, "{} uses crate::{name}, which stands below {own}", path.display());
+        for name in used.iter().filter(|name| **name != own) {
+            let Some(other) = place(name) else { continue };
+            assert!(other < own_place, "{} uses crate::{name}, which stands below {own}", path.display());
             assert!(
                 own != "gpu" || GPU_USES.contains(&name.as_str()),
                 "{} uses crate::{name}: gpu knows nothing of it",

@@ -69,18 +69,6 @@ impl Crowded {
         let clusters = (0..GROUP_CLUSTERS).map(|_| cluster()).collect();
         Crowded { scene_bounds, receiver, entity, clusters }
     }
-
-    /// Lists by a look at everything.
-    fn expected(&self) -> Vec<Vec<u32>> {
-        let everything = Candidates::all(&self.scene_bounds, self.receiver);
-        let list = |bounds| {
-            let mut entries = Vec::new();
-            let scope = Scope::new(&self.scene_bounds, self.receiver as usize, &self.entity, bounds, &[]);
-            gather::gather(&scope, &everything, &mut entries);
-            entries
-        };
-        self.clusters.iter().map(list).collect()
-    }
 }
 
 #[test]
@@ -92,11 +80,15 @@ fn the_tree_leaves_every_list_as_it_is() {
         let Crowded { scene_bounds, receiver, entity, clusters } = &crowded;
         let group = Candidates::of_group(scene_bounds, *receiver, entity, &ClusterBounds::union(clusters));
         offered += group.occluder_count();
-        all += Candidates::all(scene_bounds, *receiver).occluder_count();
-        for (bounds, expected) in clusters.iter().zip(crowded.expected()) {
+        let everything = Candidates::all(scene_bounds, *receiver);
+        all += everything.occluder_count();
+        for bounds in clusters {
             let scope = Scope::new(scene_bounds, *receiver as usize, entity, bounds, &[]);
-            let mut found = Vec::new();
-            gather::gather(&scope, &group, &mut found);
+            let [found, expected] = [&group, &everything].map(|candidates| {
+                let mut entries = Vec::new();
+                gather::gather(&scope, candidates, &mut entries);
+                entries
+            });
             assert_eq!(found, expected, "round {round}");
             listed += expected.len();
             // Clusters are merged again by this test.

@@ -1,22 +1,10 @@
 //! The camera, and the picture a scene begins with.
 
-use super::{SMALL, built_in, from_text, picture_place};
+use super::{SMALL, from_text, picture_place};
 use glam::{DVec3, Vec3};
-use shadow_fields::asset::embedded;
-use shadow_fields::scene::{Data, Scene};
-use shadow_fields::view::{Command, Editor};
+use shadow_fields::scene::Data;
+use shadow_fields::view::Command;
 use std::path::Path;
-
-#[test]
-fn the_first_picture_is_the_files() {
-    for (name, _) in embedded::scenes() {
-        let editor = built_in(name);
-        let scene = Scene::load(Path::new(&format!("assets/scenes/{name}.toml"))).unwrap();
-        assert_eq!(editor.camera(), &scene.data.camera, "{name}");
-        assert_eq!((editor.placements(), editor.selection), (scene.at(0.0), None));
-        assert!(editor.running && editor.undo_count() == 0 && editor.overlay);
-    }
-}
 
 #[test]
 fn a_scene_without_distant_light_gets_a_sky_that_is_saved() {
@@ -28,9 +16,7 @@ fn a_scene_without_distant_light_gets_a_sky_that_is_saved() {
     // Turned off, it stays off when it is saved.
     assert!(editor.apply(Command::SetSky(0.0)).changed.sky && editor.scene().environment.is_none());
     let saved = editor.data(Path::new("")).to_toml().unwrap();
-    let read = |path: &Path| Err(shadow_fields::Error::input(path, "this test has no files"));
-    let again = Editor::new(Scene::parse(&saved, Path::new("d.toml"), &read).unwrap(), Path::new("d.toml"));
-    assert!(again.scene().environment.is_none());
+    assert!(from_text(&saved).scene().environment.is_none());
     // A scene that has its light keeps it.
     assert!(from_text(SMALL).scene().data.environment.sky.is_none());
 }

@@ -32,13 +32,9 @@ fn any_command() -> impl Strategy<Value = Command> {
         number().prop_map(Command::SetLight),
         number().prop_map(Command::SetExposure),
         [0_u32..2000, 0_u32..2000].prop_map(Command::Resize),
-        (0_usize..CONTROLS.len()).prop_flat_map(|row| proptest::sample::select(row_commands(row))),
+        proptest::sample::select(CONTROLS.iter().flat_map(|row| row.commands()).collect::<Vec<_>>()),
+        proptest::sample::select(vec![Command::DragEnd, Command::EndSlide]),
     ]
-}
-
-fn row_commands(row: usize) -> Vec<Command> {
-    let commands = CONTROLS[row].commands();
-    if commands.is_empty() { vec![Command::DragEnd, Command::EndSlide] } else { commands }
 }
 
 proptest! {

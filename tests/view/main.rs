@@ -11,25 +11,24 @@ mod lights;
 mod panel;
 mod selection;
 
+#[path = "../common/mod.rs"]
+mod common;
 #[path = "../common/model.rs"]
 mod model;
 
 use glam::DVec3;
-use shadow_fields::asset::embedded;
 use shadow_fields::draw::camera::clip_from_world;
 use shadow_fields::scene::Scene;
 use shadow_fields::view::{Command, Editor};
 use std::path::Path;
 
 fn built_in(name: &str) -> Editor {
-    let (_, text) = embedded::scenes().into_iter().find(|(found, _)| *found == name).unwrap();
     let path = format!("assets/scenes/{name}.toml");
-    Editor::new(Scene::parse(text, Path::new(&path), &embedded::read).unwrap(), Path::new(&path))
+    Editor::new(Scene::load(path.as_ref()).unwrap(), path.as_ref())
 }
 
 fn from_text(text: &str) -> Editor {
-    let read = |path: &Path| Err(shadow_fields::Error::input(path, "this test has no files"));
-    Editor::new(Scene::parse(text, Path::new("t.toml"), &read).unwrap(), Path::new("t.toml"))
+    Editor::new(common::parse(text), Path::new("t.toml"))
 }
 
 /// A ball, a lamp and a floor.

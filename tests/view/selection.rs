@@ -104,15 +104,12 @@ fn picking_finds_what_is_seen() {
 fn picking_is_exact_from_far_and_at_odd_scales() {
     for scale in [1e-6, 1.0, 1e4] {
         let text = format!(
-            "[camera]\neye = [0, {0}, {1}]\ntarget = [0, 0, 0]\n[[mesh]]\nname = \"b\"\nsphere = {{ radius_m = 1, subdivisions = 3 }}\n\
-             [[entity]]\nmesh = \"b\"\nscale = {2}\n",
-            0.0,
-            900.0 * scale,
-            scale
+            "camera = {{ eye = [0, 0, {}], target = [0, 0, 0] }}\noutput = {{ width = 16384, height = 16384 }}\n\
+             mesh = [{{ name = \"b\", sphere = {{ radius_m = 1, subdivisions = 3 }} }}]\n\
+             entity = [{{ mesh = \"b\", scale = {scale} }}]\n",
+            900.0 * scale
         );
-        let mut editor = from_text(
-            &text.replace("[[mesh]]", "[output]\nwidth = 20000\nheight = 20000\n[[mesh]]").replace("20000", "16384"),
-        );
+        let mut editor = from_text(&text);
         // The ball's rim: 1 / 900 of the distance.
         let rim = 8192.0 / (20.0_f32.to_radians().tan()) / 900.0;
         assert_eq!(editor.hit([8192.0, 8192.0 - 0.98 * rim]).map(|h| h.0), Some(0), "{scale}");

@@ -1,9 +1,8 @@
 //! A real window on a virtual display: every control, resizing, minimising, a screenshot against `render`, a clean end.
 
-use crate::cli::{COARSE, SMALL, command, finish, good, has_device};
+use crate::cli::{COARSE, Folder, SMALL, finish};
 use crate::viewing::{OPTIONS, PATIENCE, SIZE, View, desk, open};
 use crate::{model, room};
-use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
 /// Keys of every row of the help, and what the log says of them.
@@ -30,7 +29,7 @@ const KEYS: [(&str, &str); 17] = [
 #[test]
 fn a_window_does_what_its_controls_say() {
     let Some((folder, display)) = desk() else { return };
-    let mut view = open(&display, folder.path());
+    let mut view = open(&display, &folder);
     let first = view.picture(SIZE);
     assert!(first.iter().any(|p| *p != first[0]), "the window is of one colour");
 
@@ -76,20 +75,14 @@ fn a_window_does_what_its_controls_say() {
     let heard = view.close();
     let swapchains = heard.iter().filter(|line| line.contains("swapchain of")).count();
     assert!(swapchains >= 8, "{swapchains} swapchains for ten sizes");
-    good(folder.path(), &format!("render scene-edited.toml -o again.png {COARSE}"));
-    let again = image::open(folder.path().join("again.png")).unwrap().into_rgb8();
+    folder.good(&format!("render scene-edited.toml -o again.png {COARSE}"));
+    let again = image::open(folder.at("again.png")).unwrap().into_rgb8();
     assert_eq!([again.width() as usize, again.height() as usize], SIZE, "the saved scene has the window's size");
     let again: Vec<[u8; 3]> = again.pixels().map(|p| p.0).collect();
     assert_eq!(room::apart(&shown, &again), 0, "pixels of the window that `render` makes otherwise");
-    let kept = image::open(folder.path().join("scene-001.png")).unwrap().into_rgb8();
+    let kept = image::open(folder.at("scene-001.png")).unwrap().into_rgb8();
     assert!(kept.pixels().zip(&again).all(|(a, b)| a.0 == *b), "F12 writes what `render` does");
-    assert!(folder.path().join("scene-001.exr").exists());
-}
-
-/// The names of files in a folder.
-fn names(folder: &Path, ending: &str) -> Vec<PathBuf> {
-    let files = std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path());
-    files.filter(|file| file.extension().is_some_and(|e| e == ending)).collect()
+    assert!(folder.at("scene-001.exr").exists());
 }
 
 /// A GLB file with three parts that move and two lamps: in the window and as a picture, with no scene file.
@@ -97,12 +90,11 @@ fn names(folder: &Path, ending: &str) -> Vec<PathBuf> {
 fn a_gltf_file_moves_in_the_window() {
     let Some((folder, display)) = desk() else { return };
     model::robot().write(folder.path(), "robot");
-    good(folder.path(), &format!("render robot.glb -o robot_#.png --frames 3 --fps 2 {SMALL}"));
-    let pictures = names(folder.path(), "png").into_iter().map(|file| std::fs::read(file).unwrap());
-    let pictures: std::collections::BTreeSet<Vec<u8>> = pictures.collect();
-    assert_eq!(pictures.len(), 3, "each picture of the motion is another");
+    folder.good(&format!("render robot.glb -o robot_#.png --frames 3 --fps 2 {SMALL}"));
+    let [a, b, c] = ["robot_0.png", "robot_1.png", "robot_2.png"].map(|name| folder.read(name));
+    assert!(a != b && b != c && a != c, "each picture of the motion is another");
 
-    let view = View::open(&display, folder.path(), &format!("view robot.glb {OPTIONS} {COARSE}"));
+    let view = View::open(&display, &folder, &format!("view robot.glb {OPTIONS} {COARSE}"));
     // Once the first picture is there, another follows.
     for _ in 0..2 {
         let first = display.look(SIZE);
@@ -112,14 +104,14 @@ fn a_gltf_file_moves_in_the_window() {
             std::thread::sleep(Duration::from_millis(100));
         }
     }
-    assert!(names(folder.path(), "toml").is_empty(), "no scene file was written");
+    assert!(folder.names().iter().all(|name| !name.ends_with(".toml")), "no scene file was written");
     view.close();
 }
 
 #[test]
 fn the_next_scene_is_baked_and_shown_and_closing_ends_a_bake() {
     let Some((folder, display)) = desk() else { return };
-    let mut view = open(&display, folder.path());
+    let mut view = open(&display, &folder);
     view.key("z", "command NextScene");
     // In the middle of what may be its bake.
     view.close();
@@ -127,11 +119,8 @@ fn the_next_scene_is_baked_and_shown_and_closing_ends_a_bake() {
 
 #[test]
 fn without_a_display_one_line_names_render() {
-    if !has_device() {
-        return;
-    }
-    let folder = tempfile::tempdir().unwrap();
-    let mut view = command(folder.path(), "view assets/scenes/sphere_over_plane.toml");
+    let Some(folder) = Folder::with_device() else { return };
+    let mut view = folder.command("view assets/scenes/sphere_over_plane.toml");
     let ran = finish(view.env_remove("DISPLAY").env_remove("WAYLAND_DISPLAY").env_remove("WAYLAND_SOCKET"));
     assert_eq!(ran.code, 3, "{}", ran.stderr);
     assert_eq!(ran.stderr.lines().count(), 1, "{}", ran.stderr);

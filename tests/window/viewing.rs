@@ -1,15 +1,13 @@
 //! The program with its window on a virtual display.
 
-use super::cli::{COARSE, command, has_device};
+use super::cli::{COARSE, Folder};
 use super::common::Running;
 use super::display::Display;
 use super::room;
 use std::io::{BufRead, BufReader};
-use std::path::Path;
 use std::process::Stdio;
 use std::sync::mpsc::{Receiver, channel};
 use std::time::{Duration, Instant};
-use tempfile::TempDir;
 
 pub const SIZE: [usize; 2] = [480, 320];
 /// How the lamp moves while the scene runs.
@@ -19,11 +17,8 @@ pub const OPTIONS: &str = "--size 480x320 --no-overlay --antialias samples --val
 pub const PATIENCE: Duration = Duration::from_secs(60);
 
 /// A folder and a display; `None` where a device or the display is missing.
-pub fn desk() -> Option<(TempDir, Display)> {
-    if !has_device() {
-        return None;
-    }
-    let folder = tempfile::tempdir().unwrap();
+pub fn desk() -> Option<(Folder, Display)> {
+    let folder = Folder::with_device()?;
     let display = Display::open(folder.path())?;
     Some((folder, display))
 }
@@ -38,8 +33,8 @@ pub struct View<'d> {
 }
 
 impl<'d> View<'d> {
-    pub fn open(display: &'d Display, folder: &Path, line: &str) -> Self {
-        let mut program = command(folder, line);
+    pub fn open(display: &'d Display, folder: &Folder, line: &str) -> Self {
+        let mut program = folder.command(line);
         program.env("DISPLAY", &display.name).env_remove("WAYLAND_DISPLAY").arg("-v");
         let mut child = program.stderr(Stdio::piped()).spawn().unwrap();
         let stderr = child.stderr.take().unwrap();
@@ -134,8 +129,8 @@ impl<'d> View<'d> {
 }
 
 /// Opens a window on the room, at 480x320.
-pub fn open<'d>(display: &'d Display, folder: &Path) -> View<'d> {
+pub fn open<'d>(display: &'d Display, folder: &Folder) -> View<'d> {
     let size = SIZE.map(|side| side as u32);
-    room::write(folder, size, MOTION);
+    room::write(folder.path(), size, MOTION);
     View::open(display, folder, &format!("view scene.toml --paused {OPTIONS} {COARSE}"))
 }

@@ -19,6 +19,14 @@ fn of_image(file: &Path, scale: f32) -> EnvironmentData {
     EnvironmentData { image: Some(EnvironmentImage { file: file.into(), scale }), ..Default::default() }
 }
 
+/// The light of a linear picture of that width, by what it is described with besides.
+fn of_pixels(width: usize, pixels: &[f32], scale: f32, turn_deg: f32) -> Environment {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("sky.exr");
+    write_exr(&file, width as u32, (pixels.len() / 3 / width) as u32, pixels).unwrap();
+    build(&EnvironmentData { turn_deg, ..of_image(&file, scale) })
+}
+
 /// Slow twin: radiance times basis, summed over a product rule of the given degree.
 fn by_rule(environment: &Environment, bands: usize, degree: usize) -> [Vec<f64>; 3] {
     let mut sum = [(); 3].map(|()| vec![0.0; bands * bands]);
@@ -85,12 +93,9 @@ fn sources_add() {
 
 #[test]
 fn picture_orientation() {
-    let folder = tempfile::tempdir().unwrap();
-    let file = folder.path().join("sky.exr");
     // 8 x 4: red = column, green = row.
     let pixels: Vec<f32> = (0..32).flat_map(|i| [(i % 8) as f32, (i / 8) as f32, 1.0]).collect();
-    write_exr(&file, 8, 4, &pixels).unwrap();
-    let sky = build(&of_image(&file, 2.0));
+    let sky = of_pixels(8, &pixels, 2.0, 0.0);
     let at = |x: f64, y: f64, z: f64| sky.radiance(DVec3::new(x, y, z).normalize()).map(|c| c / 2.0);
     assert_eq!(at(0.01, 0.01, -1.0), [4.0, 1.0, 1.0], "ahead, just right of the middle and above it");
     assert_eq!(at(-0.01, -0.01, -1.0), [3.0, 2.0, 1.0]);
@@ -103,12 +108,9 @@ fn picture_orientation() {
 
 #[test]
 fn picture_projection() {
-    let folder = tempfile::tempdir().unwrap();
-    let file = folder.path().join("sky.exr");
     let (width, height) = (256usize, 128usize);
     // A white picture has the coefficients of a uniform sky exactly in band 0: solid angles sum to 4 pi.
-    write_exr(&file, 256, 128, &vec![1.0; width * height * 3]).unwrap();
-    let white = build(&of_image(&file, 1.0));
+    let white = of_pixels(width, &vec![1.0; width * height * 3], 1.0, 0.0);
     for channel in white.coefficients(4) {
         assert!((channel[0] - (4.0 * PI).sqrt()).abs() < 1e-9);
         assert!(channel[1..].iter().all(|c| c.abs() < 1e-12), "{channel:?}");
@@ -124,8 +126,7 @@ fn picture_projection() {
             pixels.extend(light.radiance(DVec3::new(s * azimuth.sin(), c, -s * azimuth.cos())).map(|v| v as f32));
         }
     }
-    write_exr(&file, 256, 128, &pixels).unwrap();
-    let drawn = build(&of_image(&file, 1.0));
+    let drawn = of_pixels(width, &pixels, 1.0, 0.0);
     agree(&drawn.coefficients(5), &light.coefficients(5), 3e-4);
 }
 
@@ -141,13 +142,10 @@ fn png_pictures_are_decoded_from_srgb() {
     }
 }
 
-/// The projection of a picture of these red values.
-fn picture(width: u32, height: u32, red: &[f32], bands: usize) -> Vec<f64> {
-    let folder = tempfile::tempdir().unwrap();
-    let file = folder.path().join("sky.exr");
-    write_exr(&file, width, height, &red.iter().flat_map(|r| [*r, 0.0, 0.0]).collect::<Vec<_>>()).unwrap();
-    let sky = build(&of_image(&file, 1.0));
-    let [red, green, blue] = sky.coefficients(bands);
+/// The projection of a picture of that width and these red values.
+fn picture(width: usize, red: &[f32], bands: usize) -> Vec<f64> {
+    let pixels: Vec<f32> = red.iter().flat_map(|r| [*r, 0.0, 0.0]).collect();
+    let [red, green, blue] = of_pixels(width, &pixels, 1.0, 0.0).coefficients(bands);
     assert!(green.iter().chain(&blue).all(|c| *c == 0.0));
     red
 }
@@ -159,19 +157,19 @@ fn texels_are_integrated_exactly() {
     };
     let half = PI / 2.0;
     // Halves of the sphere are caps of 90 degrees, whatever the number of texels: up, down, left, right, ahead.
-    near(&picture(1, 2, &[1.0, 0.0], 7), &lobe::cap(7, DVec3::Y, half), "top row");
+    near(&picture(1, &[1.0, 0.0], 7), &lobe::cap(7, DVec3::Y, half), "top row");
     near(
-        &picture(3, 4, &[0., 0., 0., 0., 0., 0., 1., 1., 1., 1., 1., 1.], 7),
+        &picture(3, &[0., 0., 0., 0., 0., 0., 1., 1., 1., 1., 1., 1.], 7),
         &lobe::cap(7, DVec3::NEG_Y, half),
         "lower rows",
     );
-    near(&picture(2, 1, &[1.0, 0.0], 7), &lobe::cap(7, DVec3::NEG_X, half), "left half");
-    near(&picture(2, 3, &[0., 1., 0., 1., 0., 1.], 7), &lobe::cap(7, DVec3::X, half), "right half");
-    near(&picture(4, 1, &[0., 1., 1., 0.], 7), &lobe::cap(7, DVec3::NEG_Z, half), "the middle is ahead");
+    near(&picture(2, &[1.0, 0.0], 7), &lobe::cap(7, DVec3::NEG_X, half), "left half");
+    near(&picture(2, &[0., 1., 0., 1., 0., 1.], 7), &lobe::cap(7, DVec3::X, half), "right half");
+    near(&picture(4, &[0., 1., 1., 0.], 7), &lobe::cap(7, DVec3::NEG_Z, half), "the middle is ahead");
     // A polar cap of a third of the way down: 60 degrees.
-    near(&picture(5, 3, &[[1.0; 5].as_slice(), &[0.0; 10]].concat(), 7), &lobe::cap(7, DVec3::Y, PI / 3.0), "cap");
+    near(&picture(5, &[[1.0; 5].as_slice(), &[0.0; 10]].concat(), 7), &lobe::cap(7, DVec3::Y, PI / 3.0), "cap");
     // An octant: the integral of each axis over it is pi / 4. Column 2 of 4 is ahead to the right, the upper row.
-    let octant = picture(4, 2, &[0., 0., 1., 0., 0., 0., 0., 0.], 2);
+    let octant = picture(4, &[0., 0., 1., 0., 0., 0., 0., 0.], 2);
     let first = 0.488_602_511_902_919_9 * PI / 4.0;
     near(&octant, &[(0.25 / PI).sqrt() * half, -first, -first, -first], "octant x > 0, y > 0, z < 0");
 }
@@ -194,15 +192,10 @@ fn a_turn_carries_everything_along() {
         }
     }
     // Pictures, too: a quarter turn moves the columns by a quarter of the width.
-    let folder = tempfile::tempdir().unwrap();
-    let file = folder.path().join("sky.exr");
     let columns = |shift: usize| {
         (0..24).flat_map(|i| [[1.0, 2.0, 4.0, 8.0, 16.0, 3.0, 5.0, 7.0][(i + shift) % 8]; 3]).collect::<Vec<f32>>()
     };
-    let of = |pixels: &[f32], turn_deg: f32| {
-        write_exr(&file, 8, 3, pixels).unwrap();
-        build(&EnvironmentData { turn_deg, ..of_image(&file, 0.5) }).coefficients(6)
-    };
+    let of = |pixels: &[f32], turn_deg: f32| of_pixels(8, pixels, 0.5, turn_deg).coefficients(6);
     agree(&of(&columns(0), 90.0), &of(&columns(2), 0.0), 1e-9);
 }
 

@@ -20,12 +20,11 @@ fn files(folder: &Path, ending: &str) -> Vec<PathBuf> {
     paths
 }
 
-/// (whether it was baked, header, payload) of a field that comes through the cache.
-fn cached(device: &Arc<Device>, folder: &Path, mesh: &Mesh, header: &mut FieldHeader) -> (bool, Vec<u8>) {
+/// A field that comes through the cache, and whether it was baked.
+fn cached(device: &Arc<Device>, folder: &Path, mesh: &Mesh, header: &FieldHeader) -> (bool, ShadowField) {
     let cache = Cache::new(Some(folder));
     let (field, report) = cache.field(&Baker::new(device, &library()), mesh, header, &quiet).unwrap();
-    *header = field.header.clone();
-    (report.is_some(), field.payload.clone())
+    (report.is_some(), ShadowField::clone(&field))
 }
 
 #[test]
@@ -34,43 +33,27 @@ fn the_cache_finds_what_it_holds_and_replaces_what_is_damaged() {
     let folder = tempfile::tempdir().unwrap();
     let mesh = torus();
     let options = small("cube:10x5", Storage::F16, 4);
-    let fresh = || bake::header(&mesh, FieldKind::Occlusion, &options);
-    let mut header = fresh();
-    let (baked, bytes) = cached(&gpu.device, folder.path(), &mesh, &mut header);
-    assert!(baked && header.filled_samples > 0);
-    // The same header again, now with its count of filled samples, and a fresh one.
-    let mut again = header.clone();
-    assert_eq!(
-        cached(&gpu.device, folder.path(), &mesh, &mut again),
-        (false, bytes.clone()),
-        "the header as it came back"
-    );
-    let mut again = fresh();
-    assert_eq!(cached(&gpu.device, folder.path(), &mesh, &mut again), (false, bytes.clone()));
-    assert_eq!(again, header, "the count of filled samples comes from the file");
+    let header = bake::header(&mesh, FieldKind::Occlusion, &options);
+    let run = |mesh: &Mesh, header: &FieldHeader| cached(&gpu.device, folder.path(), mesh, header);
+    let (baked, first) = run(&mesh, &header);
+    assert!(baked && first.header.filled_samples > 0);
+    // The header again, and as it came back, with its count of filled samples.
+    for header in [&header, &first.header] {
+        assert!(run(&mesh, header) == (false, first.clone()), "the count of filled samples comes from the file");
+    }
     // The name of a mesh is for people; equal content is found under any name.
     let mut renamed = mesh.clone();
     renamed.name = "other".into();
-    let mut header_renamed = bake::header(&renamed, FieldKind::Occlusion, &options);
-    assert!(!cached(&gpu.device, folder.path(), &renamed, &mut header_renamed).0);
+    assert!(!run(&renamed, &bake::header(&renamed, FieldKind::Occlusion, &options)).0);
 
     let paths = files(folder.path(), "sf");
     assert_eq!(paths.len(), 1);
     let whole = std::fs::read(&paths[0]).unwrap();
-    type Damage<'d> = &'d dyn Fn(&mut Vec<u8>);
-    let damage: [Damage<'_>; 3] = [
-        &|b| {
-            let middle = b.len() / 2;
-            b[middle] ^= 4;
-        },
-        &|b| b.truncate(b.len() - 1),
-        &|b| b.clear(),
-    ];
-    for edit in damage {
-        let mut bad = whole.clone();
-        edit(&mut bad);
+    let mut flipped = whole.clone();
+    flipped[whole.len() / 2] ^= 4;
+    for bad in [&flipped[..], &whole[..whole.len() - 1], &[]] {
         std::fs::write(&paths[0], bad).unwrap();
-        assert_eq!(cached(&gpu.device, folder.path(), &mesh, &mut fresh()), (true, bytes.clone()), "baked anew");
+        assert!(run(&mesh, &header) == (true, first.clone()), "baked anew");
         assert!(std::fs::read(&paths[0]).unwrap() == whole, "and replaced");
     }
     // Everything that changes a field has a file of its own.
@@ -81,8 +64,7 @@ fn the_cache_finds_what_it_holds_and_replaces_what_is_damaged() {
         small("cube:4x3,outer=7", Storage::F16, 4),
     ];
     for (i, other) in others.iter().enumerate() {
-        let mut header = bake::header(&mesh, FieldKind::Occlusion, other);
-        assert!(cached(&gpu.device, folder.path(), &mesh, &mut header).0, "{other:?}");
+        assert!(run(&mesh, &bake::header(&mesh, FieldKind::Occlusion, other)).0, "{other:?}");
         assert_eq!(files(folder.path(), "sf").len(), 2 + i);
     }
 }
@@ -93,17 +75,15 @@ fn a_file_under_another_name_is_not_believed() {
     let folder = tempfile::tempdir().unwrap();
     let options = small("cube:3x3,inner=1.02", Storage::F16, 4);
     let meshes = [torus(), generate::cuboid(Vec3::ONE, 2)];
-    let run = |mesh: &Mesh| {
-        let mut header = bake::header(mesh, FieldKind::Occlusion, &options);
-        cached(&gpu.device, folder.path(), mesh, &mut header)
-    };
+    let run =
+        |mesh: &Mesh| cached(&gpu.device, folder.path(), mesh, &bake::header(mesh, FieldKind::Occlusion, &options));
     let (_, first) = run(&meshes[0]);
     let name = files(folder.path(), "sf").remove(0);
     let (_, second) = run(&meshes[1]);
-    assert_ne!(first, second);
+    assert!(first != second);
     let other = files(folder.path(), "sf").into_iter().find(|path| *path != name).unwrap();
     std::fs::copy(&other, &name).unwrap();
-    assert_eq!(run(&meshes[0]), (true, first), "a whole file, but another mesh's");
+    assert!(run(&meshes[0]) == (true, first), "a whole file, but another mesh's");
 }
 
 #[test]
@@ -143,7 +123,7 @@ fn without_a_folder_a_bake_is_kept_in_memory() {
     let Some(gpu) = gpu() else { return };
     let mesh = generate::torus(1.0, 0.3, 12, 8);
     let options = small("cube:2x1", Storage::F16, 2);
-    let baker = Baker::new(&gpu.device, &gpu.library);
+    let baker = gpu.baker();
     let header = bake::header(&mesh, FieldKind::Occlusion, &options);
     let alone = GroupPlan::alone(&Arc::new(mesh.clone()), &options, Wanted::TRANSFER);
     for _ in 0..2 {
@@ -172,19 +152,18 @@ fn two_devices_bake_into_one_cache() {
         let threads = [0, 1].map(|_| {
             scope.spawn(|| {
                 let device = open().unwrap();
-                let mut header = bake::header(&mesh, FieldKind::Occlusion, &options);
-                let (_, bytes) = cached(&device, folder.path(), &mesh, &mut header);
+                let header = bake::header(&mesh, FieldKind::Occlusion, &options);
+                let (_, field) = cached(&device, folder.path(), &mesh, &header);
                 device.save_pipeline_cache();
-                (header, bytes, device.take_validation_messages())
+                (field, device.take_validation_messages())
             })
         });
         threads.map(|thread| thread.join().unwrap())
     });
     assert!(outcomes[0] == outcomes[1], "the same header and bytes");
-    assert_eq!(outcomes[0].2, Vec::<String>::new());
+    assert_eq!(outcomes[0].1, Vec::<String>::new());
     let paths = files(folder.path(), "sf");
     assert_eq!(paths.len(), 1);
-    let kept = ShadowField::read(&paths[0]).unwrap();
-    assert!(kept.payload == outcomes[0].1 && kept.header == outcomes[0].0);
+    assert!(ShadowField::read(&paths[0]).unwrap() == outcomes[0].0);
     assert_eq!(std::fs::read_dir(folder.path().join("fields")).unwrap().count(), 1, "no temporary file is left");
 }

@@ -1,24 +1,21 @@
-//! Baked fields and transfers: against closed forms, against each other, and through the cache.
+//! Baked fields: against closed forms, against each other, and through the cache.
 
 mod cache;
-mod transfer;
 
-use crate::common::{Gpu, generate, gpu, library, parse};
+use crate::common::{Gpu, generate, gpu, parse};
 use fastrand::Rng;
 use glam::{DVec3, Vec3};
 use half::f16;
 use shadow_fields::asset::Mesh;
 use shadow_fields::bake::cache::Cache;
-use shadow_fields::bake::project::{self};
+use shadow_fields::bake::project;
 use shadow_fields::bake::surface::{Surface, inside, pushed_out};
 use shadow_fields::bake::triangles::unit_positions;
-use shadow_fields::bake::{self, Baker, SceneNeeds, TRANSFER_OFFSET, capture};
+use shadow_fields::bake::{self, SceneNeeds, TRANSFER_OFFSET, capture};
 use shadow_fields::field::{FieldHeader, FieldKind, ShadowField, Storage};
-use shadow_fields::gpu::Device;
 use shadow_fields::scene_buffers::SceneBuffers;
 use shadow_fields::sh::lobe;
 use shadow_fields::sh::quadrature::random_direction;
-use std::sync::{Arc, OnceLock};
 
 fn quiet(_: u32, _: u32) {}
 
@@ -27,22 +24,17 @@ fn small(lattice: &str, storage: Storage, bands: usize) -> bake::Options {
     bake::Options { bands, storage, lattice: lattice.parse().unwrap(), face_px: 32, ..Default::default() }
 }
 
-fn bake_field(device: &Arc<Device>, mesh: &Mesh, kind: FieldKind, options: &bake::Options) -> ShadowField {
-    let baker = Baker::new(device, &library());
-    let (field, report) = baker.field(mesh, bake::header(mesh, kind, options), &quiet).unwrap();
-    assert_eq!(report.samples + report.filled, field.header.lattice.sample_count());
-    assert_finite(&field);
-    field
-}
-
-fn assert_finite(field: &ShadowField) {
+fn bake_field(gpu: &Gpu, mesh: &Mesh, kind: FieldKind, options: &bake::Options) -> ShadowField {
+    let (field, report) = gpu.baker().field(mesh, bake::header(mesh, kind, options), &quiet).unwrap();
     let header = &field.header;
+    assert_eq!(report.samples + report.filled, header.lattice.sample_count());
     for sample in 0..header.lattice.stored_count() {
         for number in 0..header.sample_stride() {
             let value = field.stored(sample, 0, number);
             assert!(value.is_finite(), "{}: sample {sample}, number {number} is {value}", header.mesh);
         }
     }
+    field
 }
 
 fn norm(values: impl IntoIterator<Item = f64>) -> f64 {
@@ -53,41 +45,24 @@ fn difference(a: &[f64], b: &[f64]) -> f64 {
     norm(a.iter().zip(b).map(|(a, b)| a - b))
 }
 
-/// Receivers log-uniform in distance from 1.05 r to 8 r, uniform in direction.
-fn receivers(count: usize, seed: u64) -> Vec<DVec3> {
-    let mut rng = Rng::with_seed(seed);
-    (0..count).map(|_| random_direction(&mut rng) * 1.05 * (8.0_f64 / 1.05).powf(rng.f64())).collect()
-}
-
-/// The default field of a sphere, baked once.
-fn sphere_field(gpu: &Gpu) -> &'static ShadowField {
-    static FIELD: OnceLock<ShadowField> = OnceLock::new();
-    FIELD.get_or_init(|| {
-        bake_field(&gpu.device, &generate::sphere(2.5, 4), FieldKind::Occlusion, &bake::Options::default())
-    })
-}
-
-/// Mean and largest relative error of the blocked part of a sphere's field.
-fn sphere_error(field: &ShadowField) -> (f64, f64) {
-    let receivers = receivers(1000, 5);
-    let errors: Vec<f64> = receivers
-        .iter()
-        .map(|&p| {
-            let mut found = [0.0; 16];
-            field.lookup(p, 0, &mut found);
-            let wanted = lobe::cap(4, -p.normalize(), p.length().recip().asin());
-            difference(&found, &wanted) / norm(wanted)
-        })
-        .collect();
-    (errors.iter().sum::<f64>() / errors.len() as f64, errors.iter().copied().fold(0.0, f64::max))
-}
-
 #[test]
 fn sphere_has_its_closed_form() {
     let Some(gpu) = gpu() else { return };
-    let field = sphere_field(&gpu);
+    let mesh = generate::sphere(2.5, 4);
+    let field = bake_field(&gpu, &mesh, FieldKind::Occlusion, &bake::Options::default());
     assert_eq!(field.header.filled_samples, 0, "all shells lie outside");
-    let (mean, largest) = sphere_error(field);
+    // Receivers log-uniform in distance from 1.05 r to 8 r, uniform in direction.
+    let mut rng = Rng::with_seed(5);
+    let errors = (0..1000).map(|_| {
+        let p = random_direction(&mut rng) * 1.05 * (8.0_f64 / 1.05).powf(rng.f64());
+        let mut found = [0.0; 16];
+        field.lookup(p, 0, &mut found);
+        let wanted = lobe::cap(4, -p.normalize(), p.length().recip().asin());
+        difference(&found, &wanted) / norm(wanted)
+    });
+    let errors: Vec<f64> = errors.collect();
+    let mean = errors.iter().sum::<f64>() / errors.len() as f64;
+    let largest = errors.iter().copied().fold(0.0, f64::max);
     // The bounds are those of an earlier lattice, 6 shells in equal steps of the logarithm: mean 0.032, largest 0.11.
     // The default has more shells, interpolates b / (1 - c), and stays below them.
     assert!(mean < 0.035 && largest < 0.12, "{mean} {largest}");
@@ -101,7 +76,7 @@ fn torus() -> Mesh {
 fn samples_in_the_tube_are_filled_from_outside() {
     let Some(gpu) = gpu() else { return };
     let mesh = torus();
-    let field = bake_field(&gpu.device, &mesh, FieldKind::Occlusion, &small("cube:10x5", Storage::F32, 4));
+    let field = bake_field(&gpu, &mesh, FieldKind::Occlusion, &small("cube:10x5", Storage::F32, 4));
     let header = &field.header;
     let lattice = header.lattice;
     let positions: Vec<DVec3> = (0..lattice.sample_count()).map(|i| lattice.position(i)).collect();
@@ -165,8 +140,8 @@ fn one_colour_shines_where_it_blocks() {
         let triangles = mesh.triangles.clone();
         let bright = Mesh::new(name, mesh.positions.clone(), mesh.normals.clone(), colors, triangles).unwrap();
         let options = small("cube:5x3", Storage::F32, 4);
-        let blocked = bake_field(&gpu.device, &mesh, FieldKind::Occlusion, &options);
-        let radiance = bake_field(&gpu.device, &bright, FieldKind::Radiance, &options);
+        let blocked = bake_field(&gpu, &mesh, FieldKind::Occlusion, &options);
+        let radiance = bake_field(&gpu, &bright, FieldKind::Radiance, &options);
         assert_eq!(radiance.header.radiance_scale, 7.0);
         let px = f64::from(radiance.header.face_px);
         let mut odd = 0;
@@ -212,13 +187,12 @@ fn a_field_lands_at_its_place_in_a_scene() {
     ];
     let scene = parse(&text.concat());
     let needs = SceneNeeds::of(&scene, &options, shadow_fields::scene::Lights::Sh);
-    let baker = Baker::new(&gpu.device, &gpu.library);
-    let baked = bake::ensure(&baker, &Cache::new(None), &scene, &needs, &|_, _, _| ()).unwrap();
+    let baked = bake::ensure(&gpu.baker(), &Cache::new(None), &scene, &needs, &|_, _, _| ()).unwrap();
     let buffers = SceneBuffers::new(&gpu.device, &scene, &options, baked).unwrap();
     let mut ends = Vec::new();
     for (mesh, device_mesh) in scene.meshes.iter().zip(&buffers.meshes) {
         let slot = device_mesh.blocked.as_ref().unwrap();
-        let alone = bake_field(&gpu.device, mesh, FieldKind::Occlusion, &options);
+        let alone = bake_field(&gpu, mesh, FieldKind::Occlusion, &options);
         assert!(buffers.field(slot).unwrap() == alone, "{}: the same field", mesh.name);
         assert!(
             slot.bytes.start.is_multiple_of(256) && slot.bytes.end - slot.bytes.start == alone.header.payload_bytes()
@@ -236,7 +210,7 @@ fn progress_is_told_up_to_the_end() {
     let header = bake::header(&mesh, FieldKind::Occlusion, &options);
     let told = std::cell::RefCell::new(Vec::new());
     let progress = |done, all| told.borrow_mut().push((done, all));
-    let (field, _) = Baker::new(&gpu.device, &gpu.library).field(&mesh, header, &progress).unwrap();
+    let (field, _) = gpu.baker().field(&mesh, header, &progress).unwrap();
     let told = told.into_inner();
     let count = field.header.captured_samples;
     assert_eq!(told.last(), Some(&(count, count)));
@@ -247,11 +221,10 @@ fn progress_is_told_up_to_the_end() {
 fn what_cannot_be_baked_is_bad_input() {
     let Some(gpu) = gpu() else { return };
     let mesh = generate::sphere(1.0, 2);
-    let baker = Baker::new(&gpu.device, &gpu.library);
     let refused = |edit: &dyn Fn(&mut FieldHeader)| {
         let mut header = bake::header(&mesh, FieldKind::Occlusion, &small("cube:2x3", Storage::F16, 4));
         edit(&mut header);
-        baker.field(&mesh, header, &quiet).map(|_| ()).expect_err("refused").exit_code()
+        gpu.baker().field(&mesh, header, &quiet).map(|_| ()).expect_err("refused").exit_code()
     };
     assert_eq!(refused(&|h| h.bands = 9), 4);
     assert_eq!(refused(&|h| h.face_px = 1), 4);
@@ -271,7 +244,7 @@ fn stored_halves_are_rounded_from_the_exact_numbers() {
         Mesh::new("bright", plain.positions.clone(), Vec::new(), Some(colors), plain.triangles.clone()).unwrap();
     for (mesh, kind) in [(plain, FieldKind::Occlusion), (bright, FieldKind::Radiance)] {
         let [exact, halves] = [Storage::F32, Storage::F16]
-            .map(|storage| bake_field(&gpu.device, &mesh, kind, &small("cube:4x3", storage, 4)).payload);
+            .map(|storage| bake_field(&gpu, &mesh, kind, &small("cube:4x3", storage, 4)).payload);
         let exact = exact.chunks_exact(4).map(|b| f32::from_le_bytes(b.try_into().unwrap()));
         let halves = halves.chunks_exact(2).map(|b| f16::from_le_bytes(b.try_into().unwrap()));
         let (mut count, mut off_nearest, mut off_zero) = (0, 0, 0);

@@ -3,7 +3,6 @@
 mod change;
 
 use crate::common::{Gpu, gpu, parse, relative_rms};
-use shadow_fields::asset::embedded;
 use shadow_fields::check::sharp as check;
 use shadow_fields::draw::{Antialias, Shading};
 use shadow_fields::frame::{self};
@@ -128,18 +127,6 @@ fn spots_are_lit_as_by_rays() {
             let harmonics = error(&gpu, &scene, frame::Options { lights: Lights::Sh, ..sharp }, 1024);
             assert_eq!(harmonics, found, "{name}");
         }
-    }
-}
-
-#[test]
-fn spots_that_cannot_be_are_refused() {
-    let mesh = "[camera]\neye = [0, 2, 5]\ntarget = [0, 0, 0]\n[[mesh]]\nname = \"m\"\n";
-    let ball = "sphere = { radius_m = 0.5, subdivisions = 1 }";
-    for spot in ["inner_deg = 30, outer_deg = 20", "outer_deg = 91", "outer_deg = 0", "inner_deg = -1, outer_deg = 9"] {
-        let entity = format!("[[entity]]\nmesh = \"m\"\nemission = [1, 1, 1]\nspot = {{ {spot} }}\n");
-        let text = format!("{mesh}{ball}\n{entity}");
-        let error = Scene::parse(&text, "test.toml".as_ref(), &embedded::read).unwrap_err();
-        assert!(error.line().contains("of a spot are not 0 <= inner <= outer <= 90"), "{error}");
     }
 }
 

@@ -4,14 +4,8 @@ use std::f64::consts::PI;
 
 use fastrand::Rng;
 use glam::DVec3;
-use shadow_fields::sh::basis::{MAX_BANDS, MAX_COEFFICIENTS, basis_program, coefficient_count, evaluate};
+use shadow_fields::sh::basis::{MAX_BANDS, MAX_COEFFICIENTS, basis_program, coefficient_count, evaluate, values};
 use shadow_fields::sh::quadrature::{icosahedral_rule, random_direction, sphere_rule};
-
-fn basis(bands: usize, direction: DVec3) -> Vec<f64> {
-    let mut out = vec![f64::NAN; coefficient_count(bands)];
-    evaluate(bands, direction, &mut out);
-    out
-}
 
 /// The associated Legendre function P_l^m(cos theta) with Condon-Shortley phase from its explicit sum over powers:
 /// (-1)^m 2^l sin^m sum_k k! / (k - m)! cos^(k-m) binomial(l, k) binomial((l + k - 1) / 2, l).
@@ -47,7 +41,7 @@ fn evaluation_equals_the_slow_twin() {
     let mut rng = Rng::with_seed(1);
     for _ in 0..500 {
         let d = random_direction(&mut rng);
-        let values = basis(MAX_BANDS, d);
+        let values = values(MAX_BANDS, d);
         for l in 0..MAX_BANDS as i32 {
             for m in -l..=l {
                 let value = values[(l * (l + 1) + m) as usize];
@@ -62,7 +56,7 @@ fn evaluation_equals_the_slow_twin() {
 #[test]
 fn fewer_bands_are_a_prefix_and_leave_the_rest_alone() {
     let d = random_direction(&mut Rng::with_seed(2));
-    let all = basis(MAX_BANDS, d);
+    let all = values(MAX_BANDS, d);
     for bands in 1..=MAX_BANDS {
         let mut out = [7.0; MAX_COEFFICIENTS];
         evaluate(bands, d, &mut out);
@@ -81,7 +75,7 @@ fn nine_bands_are_refused() {
 #[test]
 fn basis_is_orthonormal() {
     let rule = sphere_rule(2 * (MAX_BANDS - 1));
-    let values: Vec<_> = rule.iter().map(|&(d, weight)| (basis(MAX_BANDS, d), weight)).collect();
+    let values: Vec<_> = rule.iter().map(|&(d, weight)| (values(MAX_BANDS, d), weight)).collect();
     for i in 0..MAX_COEFFICIENTS {
         for j in 0..MAX_COEFFICIENTS {
             let sum: f64 = values.iter().map(|(y, weight)| weight * y[i] * y[j]).sum();
@@ -143,7 +137,7 @@ fn the_program_that_is_printed_equals_evaluation() {
             let d = random_direction(&mut rng);
             let mut out = vec![f64::NAN; coefficient_count(bands)];
             basis_program(bands).evaluate(&d.to_array(), &mut out);
-            for (index, (value, expected)) in out.iter().zip(basis(bands, d)).enumerate() {
+            for (index, (value, expected)) in out.iter().zip(values(bands, d)).enumerate() {
                 // Horner's rule in z^2 cancels coefficients of up to 1e2 at 8 bands.
                 assert!((value - expected).abs() < 1e-13, "bands {bands} coefficient {index}: {value} {expected}");
             }

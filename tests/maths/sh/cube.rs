@@ -2,9 +2,10 @@
 
 use std::f64::consts::PI;
 
+use super::random;
 use fastrand::Rng;
 use glam::DVec3;
-use shadow_fields::sh::basis::{coefficient_count, values};
+use shadow_fields::sh::basis::values;
 use shadow_fields::sh::cube::{FACE_COUNT, direction, face_basis, face_st, solid_angle, texel_st};
 use shadow_fields::sh::lobe::cap;
 use shadow_fields::sh::project::project;
@@ -104,7 +105,7 @@ fn solid_angles_are_exact() {
 /// The largest error of the coefficients of a random 4-band function, sampled at the centres of texels.
 fn projection_error(face_px: usize) -> f64 {
     let mut rng = Rng::with_seed(22);
-    let coefficients: Vec<f64> = (0..coefficient_count(4)).map(|_| 2.0 * rng.f64() - 1.0).collect();
+    let coefficients = random(&mut rng, 4);
     let projected = project(4, face_px, |face, x, y| {
         let basis = values(4, direction(face, texel_st(x, face_px), texel_st(y, face_px)));
         coefficients.iter().zip(&basis).map(|(c, y)| c * y).sum()

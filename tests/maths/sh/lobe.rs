@@ -2,6 +2,7 @@
 
 use std::f64::consts::PI;
 
+use super::assert_close;
 use glam::DVec3;
 use shadow_fields::sh::basis::{MAX_BANDS, coefficient_count, values};
 use shadow_fields::sh::lobe::{cap, clamped_cosine, zonal};
@@ -13,13 +14,6 @@ const AXES: [DVec3; 4] = [
     DVec3::new(0.0, 0.0, -1.0),
     DVec3::new(-0.48, 0.8, 0.36),
 ];
-
-fn assert_close(value: &[f64], expected: &[f64], tolerance: f64, what: &str) {
-    assert_eq!(value.len(), expected.len());
-    for (k, (x, y)) in value.iter().zip(expected).enumerate() {
-        assert!((x - y).abs() < tolerance, "{what}, coefficient {k}: {x} {y}");
-    }
-}
 
 /// Coefficients of `f(w . axis)`, which is a polynomial on [`low`, 1] and 0 below: Gauss-Legendre in the height along
 /// the axis and equal angles around it, both exact, so that the edge costs no accuracy.

@@ -1,27 +1,19 @@
 //! The product tensor: counts, closed forms, quadrature of the pointwise product, the program that is printed as GLSL.
 
+use super::{assert_close, random};
 use fastrand::Rng;
 use shadow_fields::sh::basis::{coefficient_count, values};
 use shadow_fields::sh::product::Tensor;
 use shadow_fields::sh::product_program::product_program;
 use shadow_fields::sh::quadrature::sphere_rule;
 
-fn random(rng: &mut Rng, bands: usize) -> Vec<f64> {
-    (0..coefficient_count(bands)).map(|_| 2.0 * rng.f64() - 1.0).collect()
-}
+/// Sums of up to a few hundred terms of order 1.
+const SUMS: f64 = 1e-12;
 
 fn multiply(tensor: &Tensor, a: &[f64], b: &[f64]) -> Vec<f64> {
     let mut out = vec![f64::NAN; coefficient_count(tensor.bands())];
     tensor.multiply(a, b, &mut out);
     out
-}
-
-/// Sums of up to a few hundred terms of order 1: absolute, with the relative part in the terms.
-fn assert_close(value: &[f64], expected: &[f64], what: &str) {
-    assert_eq!(value.len(), expected.len());
-    for (k, (x, y)) in value.iter().zip(expected).enumerate() {
-        assert!((x - y).abs() < 1e-12 * (1.0 + y.abs()), "{what}, coefficient {k}: {x} {y}");
-    }
 }
 
 /// The product is the projection of the pointwise product.
@@ -40,7 +32,7 @@ fn product_equals_quadrature_of_the_pointwise_product() {
                 *sum += weight * value * y;
             }
         }
-        assert_close(&multiply(&tensor, &a, &b), &expected, &format!("{bands} bands"));
+        assert_close(&multiply(&tensor, &a, &b), &expected, SUMS, &format!("{bands} bands"));
     }
 }
 
@@ -56,7 +48,7 @@ fn the_program_that_is_printed_equals_the_product() {
             let mut out = vec![f64::NAN; a.len()];
             program.evaluate(&inputs, &mut out);
             let expected: Vec<f64> = a.iter().zip(multiply(&tensor, &a, &b)).map(|(a, c)| a - c).collect();
-            assert_close(&out, &expected, &format!("{bands} bands"));
+            assert_close(&out, &expected, SUMS, &format!("{bands} bands"));
         }
     }
 }

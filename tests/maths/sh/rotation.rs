@@ -2,15 +2,12 @@
 
 use std::f64::consts::PI;
 
+use super::{assert_close, random};
 use fastrand::Rng;
 use glam::{DQuat, DVec3};
-use shadow_fields::sh::basis::{MAX_BANDS, coefficient_count, values};
+use shadow_fields::sh::basis::{MAX_BANDS, values};
 use shadow_fields::sh::quadrature::random_direction;
 use shadow_fields::sh::rotation::{Rotation, rotate_program, turns};
-
-fn random(rng: &mut Rng, bands: usize) -> Vec<f64> {
-    (0..coefficient_count(bands)).map(|_| 2.0 * rng.f64() - 1.0).collect()
-}
 
 fn random_rotation(rng: &mut Rng) -> DQuat {
     DQuat::from_axis_angle(random_direction(rng), 2.0 * PI * rng.f64())
@@ -24,13 +21,6 @@ fn apply(rotation: &Rotation, coefficients: &[f64]) -> Vec<f64> {
 
 fn value(bands: usize, coefficients: &[f64], direction: DVec3) -> f64 {
     coefficients.iter().zip(values(bands, direction)).map(|(c, y)| c * y).sum()
-}
-
-/// Block elements are at most 1 and sums at most 15 terms, from f64 tables of 1e-15.
-fn assert_close(value: &[f64], expected: &[f64], what: &str) {
-    for (k, (x, y)) in value.iter().zip(expected).enumerate() {
-        assert!((x - y).abs() < 1e-12, "{what}, coefficient {k}: {x} {y}");
-    }
 }
 
 #[test]
@@ -65,7 +55,8 @@ fn the_program_that_is_printed_equals_the_rotation() {
             let expected = apply(&Rotation::new(bands, rotation), &coefficients);
             let mut out = vec![f64::NAN; coefficients.len() - 1];
             rotate_program(bands).evaluate(&[coefficients.as_slice(), &turns(rotation)].concat(), &mut out);
-            assert_close(&out, &expected[1..], "program");
+            // Block elements are at most 1 and sums at most 15 terms, from f64 tables of 1e-15.
+            assert_close(&out, &expected[1..], 1e-12, "program");
         }
     }
 }

@@ -2,20 +2,15 @@
 
 mod order;
 
-use crate::common::generate;
+use crate::common::{generate, parse};
 use glam::{DVec3, Vec3};
 use shadow_fields::scene::Scene;
 use shadow_fields::truth::raycast::{Distant, RayCast, relative_error};
 use shadow_fields::truth::{Vertex, World, pixels, receiver_vertices, sample_vertices};
-use std::path::Path;
 
 /// A ball of radius 0.5 m, 1 m above a floor of 81 vertices and albedo 0.6.
 fn scene(rest: &str) -> Scene {
-    read(&text(rest))
-}
-
-fn read(text: &str) -> Scene {
-    Scene::parse(text, Path::new("test.toml"), &|_| unreachable!("no files")).unwrap()
+    parse(&text(rest))
 }
 
 fn text(rest: &str) -> String {
@@ -126,7 +121,7 @@ fn a_receiver_shadows_itself_only_where_it_bends_inwards() {
         [[entity]]
         mesh = "torus"
         albedo = [1, 1, 1]"#;
-    let scene = read(text);
+    let scene = parse(text);
     let world = World::of(&scene, &scene.at(0.0));
     let vertices = receiver_vertices(&scene);
     let cast = RayCast::default().run(&world, &vertices);
@@ -261,7 +256,7 @@ fn a_floor_blocks_the_light_from_below() {
 #[test]
 fn pixels_and_dense_vertices_agree() {
     let text = text(&format!("{BALL}{}{SKY}", bulb(0.3, [1.5, 3.0, 0.5])));
-    let scene = read(&text.replace("cells = 8", "cells = 96").replace("[0, 3, 6]", "[0, 5, 0.5]"));
+    let scene = parse(&text.replace("cells = 8", "cells = 96").replace("[0, 3, 6]", "[0, 5, 0.5]"));
     let world = World::of(&scene, &scene.at(0.0));
     let size = [48, 32];
     let rows = std::cell::Cell::new(0);

@@ -2,8 +2,6 @@
 
 #![allow(dead_code)] // every test binary uses its own part
 
-pub use super::common::{Gpu as Stage, gpu as stage};
-
 use super::common::parse;
 use glam::{EulerRot, Quat, Vec3};
 use shadow_fields::frame;

@@ -1,8 +1,8 @@
 //! Light that bounces within a rigid group, against the closed form of a hollow sphere: of all that leaves one place of
 //! its inside, every other place receives the same.
 
-use super::common::{generate, parse, relative_rms};
-use super::stage::{Stage, small, stage};
+use super::common::{Gpu, generate, gpu, parse, relative_rms};
+use super::stage::small;
 use glam::Vec3;
 use shadow_fields::asset::Mesh;
 use shadow_fields::bounce::Bounces;
@@ -42,24 +42,24 @@ fn hollow() -> Scene {
         .unwrap()
 }
 
-fn lit(stage: &Stage, scene: &Scene, bounces: Bounces) -> Vec<[f32; 3]> {
-    let mut frame = stage.frame(scene, frame::Options { bounces, lights: Lights::Sharp, ..small() });
-    stage.light(&mut frame, &scene.at(0.0)).remove(0)
+fn lit(gpu: &Gpu, scene: &Scene, bounces: Bounces) -> Vec<[f32; 3]> {
+    let mut frame = gpu.frame(scene, frame::Options { bounces, lights: Lights::Sharp, ..small() });
+    gpu.light(&mut frame, &scene.at(0.0)).remove(0)
 }
 
 #[test]
 fn all_of_a_hollow_sphere_is_lit_by_its_mean() {
-    let Some(stage) = stage() else { return };
+    let Some(gpu) = gpu() else { return };
     let scene = hollow();
     let areas = scene.meshes[0].vertex_areas_m2();
-    let direct = lit(&stage, &scene, Bounces::None);
+    let direct = lit(&gpu, &scene, Bounces::None);
     let weighed = |channel: usize| direct.iter().zip(&areas).map(move |(c, area)| f64::from(c[channel]) * area);
     let whole: f64 = areas.iter().sum();
     let mean = [0, 1, 2].map(|channel| weighed(channel).sum::<f64>() / whole);
     assert!(mean[0] > 0.01 && mean[0] > 1.5 * mean[1], "the lamp shines: {mean:?}");
     let albedo = f64::from(ALBEDO);
     for (bounces, gain) in [(Bounces::One, albedo), (Bounces::All, albedo / (1.0 - albedo))] {
-        let found = lit(&stage, &scene, bounces);
+        let found = lit(&gpu, &scene, bounces);
         for (v, (found, direct)) in found.iter().zip(&direct).enumerate() {
             for channel in 0..3 {
                 let wanted = gain * mean[channel];
@@ -74,7 +74,7 @@ fn all_of_a_hollow_sphere_is_lit_by_its_mean() {
 /// What moves within the sphere is lit by the mean of its inside, which rests.
 #[test]
 fn what_moves_is_lit_by_what_rests() {
-    let Some(stage) = stage() else { return };
+    let Some(gpu) = gpu() else { return };
     let moving = Motion::Spin { axis: Vec3::Y, period_s: 9.0 };
     let scene = Scene::builder()
         .mesh("inside", inside(generate::sphere(1.0, 4)))
@@ -87,8 +87,8 @@ fn what_moves_is_lit_by_what_rests() {
         .unwrap();
     let areas = scene.meshes[0].vertex_areas_m2();
     let frame = |bounces| {
-        let mut frame = stage.frame(&scene, frame::Options { bounces, lights: Lights::Sharp, ..small() });
-        stage.light(&mut frame, &scene.at(0.0))
+        let mut frame = gpu.frame(&scene, frame::Options { bounces, lights: Lights::Sharp, ..small() });
+        gpu.light(&mut frame, &scene.at(0.0))
     };
     let direct = frame(Bounces::None);
     let all = frame(Bounces::All);
@@ -130,12 +130,12 @@ fn usual(bounces: Bounces) -> frame::Options {
 /// Light between what moves and what rests, both ways, beside rays that are followed from surface to surface.
 #[test]
 fn what_moves_and_what_rests_light_each_other() {
-    let Some(stage) = stage() else { return };
+    let Some(gpu) = gpu() else { return };
     let scene = parse(THINGS);
     let placements = scene.at(0.0);
     let light = |bounces| {
-        let mut frame = stage.frame(&scene, usual(bounces));
-        stage.light(&mut frame, &placements)
+        let mut frame = gpu.frame(&scene, usual(bounces));
+        gpu.light(&mut frame, &placements)
     };
     let [direct, one, all] = [Bounces::None, Bounces::One, Bounces::All].map(light);
     let world = World::of(&scene, &placements);
@@ -157,7 +157,7 @@ fn what_moves_and_what_rests_light_each_other() {
 /// Light that a panel throws on the ceiling right above it does not pass through the panel, whether that moves or not.
 #[test]
 fn a_panel_below_a_ceiling_hides_what_it_lights() {
-    let Some(stage) = stage() else { return };
+    let Some(gpu) = gpu() else { return };
     for motion in ["", "motion = [{ spin = { period_s = 9 } }], "] {
         let text = format!(
             r#"
@@ -183,8 +183,8 @@ fn a_panel_below_a_ceiling_hides_what_it_lights() {
             estimates.into_iter().flat_map(|estimate| estimate.radiosity).sum::<f64>()
         };
         let sum = |bounces| {
-            let mut frame = stage.frame(&scene, usual(bounces));
-            let found = stage.light(&mut frame, &placements);
+            let mut frame = gpu.frame(&scene, usual(bounces));
+            let found = gpu.light(&mut frame, &placements);
             floor.iter().flat_map(|v| found[v.entity][v.index]).map(f64::from).sum::<f64>()
         };
         let [direct, all] = [0, 1].map(rays);
@@ -213,9 +213,9 @@ fn stands(mesh: &str, x: f32, y: f32) -> EntityData {
     EntityData { position: Vec3::new(x, y, 0.0), albedo: Vec3::splat(0.7).into(), ..EntityData::of_mesh(mesh) }
 }
 
-fn frame_of_rooms(stage: &Stage, scene: &Scene) -> frame::Frame {
+fn frame_of_rooms(gpu: &Gpu, scene: &Scene) -> frame::Frame {
     let bake = bake::Options { vertices: 8000, ..usual(Bounces::One).bake };
-    stage.frame(scene, frame::Options { bake, ..usual(Bounces::One) })
+    gpu.frame(scene, frame::Options { bake, ..usual(Bounces::One) })
 }
 
 /// Floor and ceiling of the dark room, as far as the lamp's rays do not come through the doorway.
@@ -231,16 +231,16 @@ fn dark_vertices(scene: &Scene) -> Vec<Vertex> {
 /// A door that moves shuts light out, where one that stands aside lets it in.
 #[test]
 fn no_light_bounces_through_a_shut_door() {
-    let Some(stage) = stage() else { return };
+    let Some(gpu) = gpu() else { return };
     let spin = vec![Motion::Spin { axis: Vec3::Y, period_s: 9.0 }];
     let door = EntityData { motion: spin, ..stands("door", 0.0, -0.25) };
     let door_mesh = generate::cuboid(Vec3::new(1.0, 2.1, 0.05), 4);
     let scene = rooms().mesh("door", door_mesh).entity(door).build().unwrap();
-    let mut frame = frame_of_rooms(&stage, &scene);
+    let mut frame = frame_of_rooms(&gpu, &scene);
     let mut sum = |aside: f32| {
         let mut placements = scene.at(0.0);
         placements[5].position.z -= aside;
-        let light = stage.light(&mut frame, &placements);
+        let light = gpu.light(&mut frame, &placements);
         let dark = dark_vertices(frame.scene());
         assert!(dark.len() > 250, "{}", dark.len());
         dark.iter().map(|v| f64::from(light[0][v.index][0])).sum::<f64>()
@@ -254,11 +254,11 @@ fn no_light_bounces_through_a_shut_door() {
 /// wall that both rooms share.
 #[test]
 fn light_bounces_through_a_door_and_not_through_walls() {
-    let Some(stage) = stage() else { return };
+    let Some(gpu) = gpu() else { return };
     let scene = rooms().build().unwrap();
-    let mut frame = frame_of_rooms(&stage, &scene);
+    let mut frame = frame_of_rooms(&gpu, &scene);
     let placements = scene.at(0.0);
-    let light = stage.light(&mut frame, &placements);
+    let light = gpu.light(&mut frame, &placements);
     let scene = frame.scene();
     let mesh = scene.surface(0);
     let dark: Vec<Vertex> = dark_vertices(scene).into_iter().step_by(5).collect();
@@ -282,7 +282,7 @@ fn light_bounces_through_a_door_and_not_through_walls() {
 /// aimed at it. Those that leave in one pattern meet it once or never, and light the walls in blotches.
 #[test]
 fn the_inside_of_a_shade_lights_walls_evenly() {
-    let Some(stage) = stage() else { return };
+    let Some(gpu) = gpu() else { return };
     let upper = |mesh: Mesh| -> Mesh {
         let is_upper = |triangle: &[u32; 3]| triangle.iter().all(|&v| mesh.positions[v as usize].y > -0.01);
         let triangles = mesh.triangles.iter().copied().filter(is_upper).collect();
@@ -310,8 +310,8 @@ fn the_inside_of_a_shade_lights_walls_evenly() {
         .unwrap();
     let placements = scene.at(0.0);
     let [direct, one] = [Bounces::None, Bounces::One].map(|bounces| {
-        let mut frame = stage.frame(&scene, usual(bounces));
-        stage.light(&mut frame, &placements)
+        let mut frame = gpu.frame(&scene, usual(bounces));
+        gpu.light(&mut frame, &placements)
     });
     // Places in corners see half of what those beside them do.
     let is_wall = |v: &Vertex| {
@@ -333,15 +333,15 @@ fn the_inside_of_a_shade_lights_walls_evenly() {
 /// change light ten times less. (Steps of a millimetre: 0.012 of the brightest, under the ball.)
 #[test]
 fn no_light_jumps_as_a_thing_moves() {
-    let Some(stage) = stage() else { return };
+    let Some(gpu) = gpu() else { return };
     let scene = parse(THINGS);
-    let mut frame = stage.frame(&scene, usual(Bounces::One));
+    let mut frame = gpu.frame(&scene, usual(Bounces::One));
     let mut placements = scene.at(0.0);
     let mut before: Option<Vec<Vec<[f32; 3]>>> = None;
     let mut most = 0.0_f32;
     for _ in 0..120 {
         placements[1].position.x += 0.0001;
-        let now = stage.light(&mut frame, &placements);
+        let now = gpu.light(&mut frame, &placements);
         let brightest = now.iter().flatten().flatten().copied().fold(0.0, f32::max);
         if let Some(before) = &before {
             let pairs = before.iter().flatten().flatten().zip(now.iter().flatten().flatten());
@@ -355,12 +355,12 @@ fn no_light_jumps_as_a_thing_moves() {
 /// A second frame starts from the direct light, not from the light of the last one.
 #[test]
 fn frames_do_not_add_up() {
-    let Some(stage) = stage() else { return };
+    let Some(gpu) = gpu() else { return };
     let scene = hollow();
-    let mut frame = stage.frame(&scene, frame::Options { bounces: Bounces::All, lights: Lights::Sharp, ..small() });
-    let first = stage.light(&mut frame, &scene.at(0.0));
+    let mut frame = gpu.frame(&scene, frame::Options { bounces: Bounces::All, lights: Lights::Sharp, ..small() });
+    let first = gpu.light(&mut frame, &scene.at(0.0));
     assert!(first[1].iter().flatten().all(|&c| c == 0.0), "the lamp receives nothing");
     frame.forget();
-    assert_eq!(stage.light(&mut frame, &scene.at(0.0)), first);
-    assert_eq!(stage.light(&mut frame, &scene.at(0.0)), first, "at rest nothing changes");
+    assert_eq!(gpu.light(&mut frame, &scene.at(0.0)), first);
+    assert_eq!(gpu.light(&mut frame, &scene.at(0.0)), first, "at rest nothing changes");
 }

@@ -1,7 +1,6 @@
 //! What glossy surfaces reflect, against closed forms and rays through pixels.
 
-use super::common::{relative_rms, report};
-use super::stage::{Stage, stage};
+use super::common::{Gpu, gpu, relative_rms, report};
 use glam::DVec3;
 use shadow_fields::bake;
 use shadow_fields::bounce::Bounces;
@@ -36,8 +35,8 @@ fn ball(gloss: &str, more: &str) -> Scene {
     ))
 }
 
-fn picture(stage: &Stage, scene: &Scene, options: frame::Options) -> Vec<f32> {
-    let mut frame = stage.frame(scene, options);
+fn picture(gpu: &Gpu, scene: &Scene, options: frame::Options) -> Vec<f32> {
+    let mut frame = gpu.frame(scene, options);
     frame.render(&scene.at(0.0), Some(f32::INFINITY)).unwrap();
     frame.picture()
 }
@@ -62,13 +61,13 @@ fn error(found: &[f32], wanted: &[f32]) -> f64 {
 /// no light on to each other is as bright as its directional albedo.
 #[test]
 fn a_white_metal_vanishes_in_a_furnace() {
-    let Some(stage) = stage() else { return };
+    let Some(gpu) = gpu() else { return };
     for roughness in [0.0, 0.2, 0.5, 0.8, 1.0] {
         let scene = ball(&format!("roughness = {roughness:.1}, metallic = 1"), "environment = { uniform = [1, 1, 1] }");
-        let found = picture(&stage, &scene, options());
+        let found = picture(&gpu, &scene, options());
         let worst = found.iter().map(|c| (c - 1.0).abs()).fold(0.0, f32::max);
         assert!(worst < 0.03, "{roughness}: {worst} off 1");
-        let single = picture(&stage, &scene, frame::Options { single_scatter: true, ..options() });
+        let single = picture(&gpu, &scene, frame::Options { single_scatter: true, ..options() });
         let middle = single[3 * (SIZE[0] * SIZE[1] / 2 + SIZE[0] / 2) as usize];
         // The pixel in the middle sees the ball at a cosine of 0.94 or more.
         let range = [0.93, 1.0].map(|z| lobe::energy(roughness, z) as f32);
@@ -83,10 +82,10 @@ fn a_white_metal_vanishes_in_a_furnace() {
 /// on to each other is counted a second time by the diffuse part.
 #[test]
 fn a_white_dielectric_nearly_vanishes() {
-    let Some(stage) = stage() else { return };
+    let Some(gpu) = gpu() else { return };
     for roughness in [0.1, 0.5, 1.0] {
         let scene = ball(&format!("roughness = {roughness:.1}"), "environment = { uniform = [1, 1, 1] }");
-        let found = picture(&stage, &scene, options());
+        let found = picture(&gpu, &scene, options());
         let mean = found.iter().map(|c| f64::from(*c)).sum::<f64>() / found.len() as f64;
         assert!((mean - 1.0).abs() < 0.02, "{roughness}: {mean}");
     }
@@ -95,7 +94,7 @@ fn a_white_dielectric_nearly_vanishes() {
 /// Highlights of each kind of light with nothing between, beside rays: the error that the shape of a highlight has.
 #[test]
 fn highlights_are_those_of_rays() {
-    let Some(stage) = stage() else { return };
+    let Some(gpu) = gpu() else { return };
     let lamp = |mesh: &str, rotation: &str| {
         format!(
             "[[mesh]]\nname = \"lamp\"\n{mesh}\n[[entity]]\nmesh = \"lamp\"\nposition = [1.2, 2.2, 1.5]\n{rotation}\n\
@@ -116,7 +115,7 @@ fn highlights_are_those_of_rays() {
     for (name, light) in &lights {
         for (roughness, most) in [(0.3, 0.06), (0.5, 0.04), (0.7, 0.045), (1.0, 0.045)] {
             let scene = ball(&format!("roughness = {roughness:.1}, metallic = 1"), light);
-            let found = error(&picture(&stage, &scene, options()), &by_rays(&scene, 256).linear);
+            let found = error(&picture(&gpu, &scene, options()), &by_rays(&scene, 256).linear);
             lines.push(format!("{name} {roughness}: {found:.4}"));
             assert!(found < most, "{lines:?}");
         }
@@ -127,14 +126,14 @@ fn highlights_are_those_of_rays() {
 /// A gold ball on a floor under a sky: the shadow that the floor casts into the reflection.
 #[test]
 fn reflections_past_others_are_those_of_rays() {
-    let Some(stage) = stage() else { return };
+    let Some(gpu) = gpu() else { return };
     let mut lines = Vec::new();
     for (roughness, most) in [(0.2, 0.05), (0.5, 0.035), (0.7, 0.035), (1.0, 0.035)] {
         let floor = "environment = { gradient = { radiance = [1, 1.1, 1.3] } }\n\
              [[mesh]]\nname = \"floor\"\nplane = { size_m = 6, cells = 12 }\n\
              [[entity]]\nmesh = \"floor\"\nposition = [0, -1, 0]\n";
         let scene = ball(&format!("roughness = {roughness:.1}, metallic = 1"), floor);
-        let found = error(&picture(&stage, &scene, options()), &by_rays(&scene, 256).linear);
+        let found = error(&picture(&gpu, &scene, options()), &by_rays(&scene, 256).linear);
         lines.push(format!("{roughness}: {found:.4}"));
         assert!(found < most, "{lines:?}");
     }
@@ -144,7 +143,7 @@ fn reflections_past_others_are_those_of_rays() {
 /// A floor mirrors, roughly, the lit wall behind it and not the bright one beside it.
 #[test]
 fn near_things_are_reflected_where_they_stand() {
-    let Some(stage) = stage() else { return };
+    let Some(gpu) = gpu() else { return };
     let scene = scene(
         r#"
         mesh = [
@@ -162,7 +161,7 @@ fn near_things_are_reflected_where_they_stand() {
         "#,
     );
     let bake = bake::Options { groups: true, ..bake::Options::default() };
-    let found = picture(&stage, &scene, frame::Options { bounces: Bounces::One, bake, ..options() });
+    let found = picture(&gpu, &scene, frame::Options { bounces: Bounces::One, bake, ..options() });
     let wanted = by_bouncing_rays(&scene, 256, 1);
     let floor = 3 * (SIZE[0] * SIZE[1] / 2) as usize..;
     let error = error(&found[floor.clone()], &wanted.linear[floor]);
@@ -174,10 +173,10 @@ fn near_things_are_reflected_where_they_stand() {
 /// The eye changes what is reflected, and nothing is merged for it.
 #[test]
 fn a_moving_camera_merges_nothing() {
-    let Some(stage) = stage() else { return };
+    let Some(gpu) = gpu() else { return };
     let sky = "environment = { gradient = { radiance = [1, 1, 1] } }";
     let mut scene = ball("roughness = 0.5, metallic = 1", sky);
-    let mut frame = stage.frame(&scene, options());
+    let mut frame = gpu.frame(&scene, options());
     let placements = scene.at(0.0);
     frame.render(&placements, Some(1.0)).unwrap();
     let before = frame.picture();
@@ -186,7 +185,7 @@ fn a_moving_camera_merges_nothing() {
     frame.render(&placements, Some(1.0)).unwrap();
     assert_eq!(frame.merged().merged_clusters, 0);
     assert_ne!(frame.picture(), before);
-    let mut fresh = stage.frame(&scene, options());
+    let mut fresh = gpu.frame(&scene, options());
     fresh.render(&placements, Some(1.0)).unwrap();
     assert_eq!(frame.picture(), fresh.picture());
 }
@@ -194,15 +193,15 @@ fn a_moving_camera_merges_nothing() {
 /// What is not glossy looks as it did beside what is.
 #[test]
 fn a_diffuse_surface_stays_so() {
-    let Some(stage) = stage() else { return };
+    let Some(gpu) = gpu() else { return };
     let two = |gloss: &str| {
         scene(&format!(
             "environment = {{ uniform = [1, 1, 1] }}\n[[mesh]]\nname = \"ball\"\nsphere = {{ radius_m = 0.4, subdivisions = 3 }}\n\
              [[entity]]\nmesh = \"ball\"\nposition = [-0.6, 0, 0]\n[[entity]]\nmesh = \"ball\"\nposition = [0.6, 0, 0]\n{gloss}\n"
         ))
     };
-    let plain = picture(&stage, &two(""), options());
-    let beside = picture(&stage, &two("gloss = { roughness = 0.5 }"), options());
+    let plain = picture(&gpu, &two(""), options());
+    let beside = picture(&gpu, &two("gloss = { roughness = 0.5 }"), options());
     let left = |pixels: &[f32]| -> Vec<f32> {
         pixels.chunks_exact(3 * SIZE[0] as usize).flat_map(|row| row[..row.len() / 2].to_vec()).collect()
     };

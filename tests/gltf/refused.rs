@@ -55,6 +55,7 @@ fn containers_that_are_cut_off_or_damaged() {
         (glb(b"{\"asset\":{\"version\":\"1.0\"}}", b""), "asset: version \"1.0\""),
         (glb("[".repeat(5000).as_bytes(), b""), "its JSON: "),
         (glb(b"\xff\xfe", b""), "its JSON: "),
+        (b"\x93\x11GLB".to_vec(), "begins neither as GLB nor as JSON"),
     ] {
         folder.write("m.glb", bytes);
         refused(&folder, "m.glb", &[part]);

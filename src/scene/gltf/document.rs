@@ -210,7 +210,10 @@ impl Document {
 
 pub fn split(bytes: &[u8]) -> std::result::Result<(&[u8], Option<&[u8]>), String> {
     if !bytes.starts_with(b"glTF") {
-        return Ok((bytes, None));
+        let is_json = bytes.trim_ascii_start().starts_with(b"{");
+        return is_json
+            .then_some((bytes, None))
+            .ok_or_else(|| "no glTF: it begins neither as GLB nor as JSON".to_owned());
     }
     let word = |at: usize| bytes.get(at..at + 4).map(|b| u32::from_le_bytes([b[0], b[1], b[2], b[3]]) as usize);
     let version = word(4);

@@ -113,7 +113,7 @@ impl Surfaces {
                     area += areas[v];
                     middle += areas[v] * (entity.mesh.positions[v].as_dvec3() - entity.centre_m);
                     normal += areas[v] * of_vertex;
-                    if let Some(cuboid) = entity.cuboid.filter(|_| !entity.rests) {
+                    if let Some(cuboid) = self.cuboids[index] {
                         by_direction[cuboid.face(of_vertex)] += areas[v];
                         continue;
                     }

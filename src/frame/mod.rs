@@ -88,8 +88,6 @@ pub struct Frame {
     sharp: Option<Sharp>,
     work: ClusterWork,
     sky: SkyLight,
-    /// How pixels evaluate sharp lights themselves, where pictures want it.
-    pixels: Option<SharpPermutation>,
     /// Chains of sharp lights for pixels, once a picture evaluates any.
     chains: Option<PixelChains>,
     radiosity: RadiosityBuffers,
@@ -208,7 +206,6 @@ impl Frame {
             radiosity,
             picture,
             reflections,
-            pixels,
             chains: None,
             bounce,
             buffers,
@@ -232,19 +229,16 @@ impl Frame {
     }
 
     fn light_and_draw(&mut self, placements: &[Placement], white: Option<f32>, reads: bool) -> Result<Vec<Timing>> {
-        let outcome = self.try_light_and_draw(placements, white, reads);
+        let viewports: &[Viewport] = if white.is_some() { &[self.whole()] } else { &[] };
+        let outcome = self.prepare(placements, viewports, Relight::Seen).and_then(|()| {
+            let picture = white.map(|white| self.picture_work(placements, white));
+            self.run(self.merge_work()?.as_ref(), picture.as_ref(), reads)
+        });
         if outcome.is_err() {
             // The device may have run none of it, so every cluster must be merged again.
             self.forget();
         }
         outcome
-    }
-
-    fn try_light_and_draw(&mut self, placements: &[Placement], white: Option<f32>, reads: bool) -> Result<Vec<Timing>> {
-        let viewports: &[Viewport] = if white.is_some() { &[self.whole()] } else { &[] };
-        self.prepare(placements, viewports, Relight::Seen)?;
-        let picture = white.map(|white| self.picture_work(placements, white));
-        self.run(self.merge_work()?.as_ref(), picture.as_ref(), reads)
     }
 
     /// Draws the picture from the radiosity as it stands, the last merge's or what [`Frame::set_radiosity`] put there.

@@ -124,7 +124,7 @@ impl Frame {
 
     /// The chains of the time that was merged last, for pictures whose pixels evaluate sharp lights.
     fn prepare_chains(&mut self) -> Result<()> {
-        if self.pixels.is_none() || !self.work.lists.is_updated() {
+        if !self.picture.draw.evaluates_pixels() || !self.work.lists.is_updated() {
             return Ok(());
         }
         let chains = match &mut self.chains {

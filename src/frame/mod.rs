@@ -241,16 +241,17 @@ impl Frame {
         outcome
     }
 
-    /// Draws the picture from the radiosity as it stands, the last merge's or what [`Frame::set_radiosity`] put there.
+    /// Draws the picture from the radiosity as it stands.
     pub fn redraw(&mut self, placements: &[Placement], white: f32) -> Result<Vec<Timing>> {
-        let viewport = Viewport { by_vertex: self.radiosity.replaced, ..self.whole() };
-        self.prepare(placements, &[viewport], Relight::Nothing)?;
+        self.prepare(placements, &[self.whole()], Relight::Nothing)?;
         self.run(None, Some(&self.picture_work(placements, white)), true)
     }
 
-    /// As [`Frame::redraw`] for values that are not radiance: no emission, no limit to white, and the given background.
-    pub fn redraw_unlit(&mut self, placements: &[Placement], background: [f32; 3]) -> Result<Vec<Timing>> {
-        let viewport = Viewport { adds_emission: false, by_vertex: true, ..self.whole() };
+    /// Draws the comparison at place 0 ([`Frame::set_comparison`]), of values that are not radiance: no emission, no
+    /// limit to white, and the given background.
+    pub fn draw_comparison(&mut self, placements: &[Placement], background: [f32; 3]) -> Result<Vec<Timing>> {
+        let radiosity = RadiositySource::Comparison(0);
+        let viewport = Viewport { radiosity, adds_emission: false, ..self.whole() };
         self.prepare(placements, &[viewport], Relight::Nothing)?;
         let picture = self.picture_work(placements, f32::INFINITY);
         self.run(None, Some(&PictureWork { background: background.into(), ..picture }), true)
@@ -329,14 +330,6 @@ impl Frame {
 
     fn order(&self, entity: usize) -> &[u32] {
         &self.buffers.surface(entity).order
-    }
-
-    /// Replaces the radiosity of an entity's vertices, in the mesh's order, until the next merge: for pictures of what
-    /// was computed elsewhere.
-    pub fn set_radiosity(&mut self, entity: usize, radiosity: &[[f32; 3]]) -> Result<()> {
-        self.forget();
-        let order = &self.buffers.surface(entity).order;
-        self.radiosity.write(entity, order, radiosity)
     }
 
     /// Radiosity of an entity's vertices in the mesh's order: linear RGB radiance that leaves the surface, without

@@ -79,7 +79,6 @@ impl Frame {
         let relight = if relight == Relight::Seen && self.bounce.is_some() { Relight::Everything } else { relight };
         if relight != Relight::Nothing {
             self.fit_edges()?;
-            self.radiosity.replaced = false;
             self.prepare_merge(placements, if relight == Relight::Seen { viewports } else { &[] })?;
             self.fit_lists()?;
         }

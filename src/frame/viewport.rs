@@ -27,19 +27,17 @@ pub struct Viewport {
     /// Whether what entities emit is added. It is not where radiosity stands for something else, as the colours of an
     /// error do.
     pub adds_emission: bool,
-    /// Whether only the radiosity of vertices is shown, and no pixel evaluates a light itself.
-    pub by_vertex: bool,
 }
 
 impl Viewport {
     /// A region that shows what the merge lights.
     pub fn merged(area: [u32; 4]) -> Self {
-        Viewport { area, radiosity: RadiositySource::Merged, adds_emission: true, by_vertex: false }
+        Viewport { area, radiosity: RadiositySource::Merged, adds_emission: true }
     }
 
     /// Whether it shows light as it is, so that pixels may add to that of vertices.
     pub(super) fn shows_light(&self) -> bool {
-        self.radiosity == RadiositySource::Merged && !self.by_vertex
+        self.radiosity == RadiositySource::Merged
     }
 }
 

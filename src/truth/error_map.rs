@@ -57,14 +57,13 @@ impl ErrorMap {
         ColorScale::fitting(Scheme::Signed, self.errors.iter().flat_map(|(_, errors)| errors.iter().copied()))
     }
 
-    /// A colour per vertex by entity, for [`Frame::set_radiosity`].
+    /// A colour per vertex by entity, for [`Frame::set_comparison`].
     pub fn colors(&self, scale: &ColorScale) -> Vec<EntityRadiosity> {
         self.errors.iter().map(|(entity, errors)| (*entity, errors.iter().map(|e| scale.color(*e)).collect())).collect()
     }
 
     /// Draws the errors and writes the picture with its scale bar. Entities that are not lit are grey, and emission is not
-    /// drawn. `limit` replaces the fitting limit of the scale; the title states the reference's own standard error. The
-    /// frame's radiosity is replaced until the next merge.
+    /// drawn. `limit` replaces the fitting limit of the scale; the title states the reference's own standard error.
     pub fn write(
         &self,
         path: &Path,
@@ -75,14 +74,8 @@ impl ErrorMap {
     ) -> Result<ErrorPicture> {
         let fitting = self.scale();
         let scale = ColorScale { limit: limit.unwrap_or(fitting.limit), ..fitting };
-        for entity in 0..frame.scene().entities.len() {
-            let count = frame.scene().surface(entity).positions.len();
-            frame.set_radiosity(entity, &vec![NEUTRAL; count])?;
-        }
-        for (entity, colors) in self.colors(&scale) {
-            frame.set_radiosity(entity, &colors)?;
-        }
-        frame.redraw_unlit(placements, BACKGROUND)?;
+        frame.set_comparison(0, &self.colors(&scale), NEUTRAL)?;
+        frame.draw_comparison(placements, BACKGROUND)?;
         let title = format!(
             "error of radiosity / RMS radiosity by rays from vertices; blue: too dark, red: too bright; RMS {:.4}, of the rays \
              themselves {reference_error:.4}",

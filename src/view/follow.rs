@@ -307,10 +307,6 @@ fn lit(baker: &Baker, cache: &Cache, editor: &Editor, options: frame::Options) -
 
 /// The viewport of a frame without shadows.
 pub(super) fn unlit_viewport([width, height]: [u32; 2]) -> Viewport {
-    Viewport {
-        radiosity: RadiositySource::Comparison(0),
-        adds_emission: false,
-        by_vertex: true,
-        ..Viewport::merged([0, 0, width, height])
-    }
+    let radiosity = RadiositySource::Comparison(0);
+    Viewport { radiosity, adds_emission: false, ..Viewport::merged([0, 0, width, height]) }
 }

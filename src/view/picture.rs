@@ -152,7 +152,7 @@ impl Viewer {
                 Previewed::Shapes | Previewed::Nothing => unlit_viewport([width, height]),
             }];
         }
-        let [own_width, _] = self.own_size_of([width, height]);
+        let [own_width, _] = self.editor.size_in([width, height]);
         let mut own = Viewport::merged([0, 0, own_width, height]);
         if self.editor.error && self.error_shown.is_some() {
             own = Viewport { radiosity: RadiositySource::Comparison(ERROR), adds_emission: false, ..own };

@@ -115,8 +115,6 @@ pub struct Viewer {
     pub(super) quit: bool,
     /// Of which way to leave the scene it was said that it loses edits, since the last edit.
     pub(super) asked_to_leave: Option<Leave>,
-    /// Width and height of the window's picture, pixels.
-    pub(super) size: [u32; 2],
     /// Time at which the picture is refined, unless anything moves before.
     pub(super) refine_at: Option<Instant>,
     pub(super) pace: Pace,
@@ -162,7 +160,6 @@ impl Viewer {
             edges: HashMap::new(),
             quit: false,
             asked_to_leave: None,
-            size: editor.size(),
             refine_at: None,
             pace: Pace::default(),
             repaint_at: Some(Instant::now()),
@@ -183,14 +180,12 @@ impl Viewer {
     }
 
     pub fn rescued(&mut self, error: Error) -> Error {
-        // The saved picture has the size of the window.
-        self.editor.apply(Command::Resize(self.size));
         self.editor.rescued(error)
     }
 
     /// Width and height of the window's picture, pixels.
     pub fn size(&self) -> [u32; 2] {
-        self.size
+        self.editor.window()
     }
 
     /// The frame, once its fields are baked.
@@ -278,14 +273,6 @@ impl Viewer {
             }
             _ => log::info!("frame {}: command {command:?}", self.frame_count),
         }
-        // The editor's picture is the viewport that shows the merged scene.
-        let command = match command {
-            Command::Resize(size) => {
-                self.size = if size.contains(&0) { self.size } else { size };
-                Command::Resize(self.own_size())
-            }
-            other => other,
-        };
         match command {
             Command::NextScene if !self.may_leave(Leave::ForNext) => return Ok(()),
             Command::Quit => self.quit = self.may_leave(Leave::ForGood),
@@ -297,23 +284,17 @@ impl Viewer {
             }
             _ => {}
         }
-        let Effect { mut changed, message } = self.editor.apply(command);
+        let Effect { changed, message } = self.editor.apply(command);
         if changed.light() || changed.exposure {
             self.asked_to_leave = None;
-        }
-        if command == Command::ToggleReference {
-            changed |= self.editor.apply(Command::Resize(self.own_size())).changed;
         }
         self.say(message);
         self.follow(changed)
     }
 
-    /// Saves the scene with the window's size, whatever part of the window shows it.
     fn save(&mut self) {
         let path = self.editor.save_path();
-        self.editor.apply(Command::Resize(self.size));
         let outcome = self.editor.save(&path).map(|()| format!("wrote {}", path.display()));
-        self.editor.apply(Command::Resize(self.own_size()));
         self.say(Some(outcome.unwrap_or_else(|error| error.to_string())));
     }
 
@@ -347,16 +328,6 @@ impl Viewer {
         self.look_at_rays()
     }
 
-    /// Size of the viewport that shows the merged picture: the window's left half beside a reference.
-    fn own_size(&self) -> [u32; 2] {
-        self.own_size_of(self.size)
-    }
-
-    /// The same in a window of another size.
-    pub(super) fn own_size_of(&self, [width, height]: [u32; 2]) -> [u32; 2] {
-        [if self.editor.reference { (width / 2).max(1) } else { width }, height]
-    }
-
     /// Shows another scene in place of this one: a scene file, a glTF file or an OBJ file, such as one that was dropped
     /// on the window. What is left out of it is said. A file that cannot be opened is one line over the picture, and
     /// the scene stays, as it does at the first time where it has edits that are not saved.
@@ -387,7 +358,7 @@ impl Viewer {
             return Err(Error::input(path, format!("--strict: {}", left_out.join("; "))));
         }
         add_sky(&mut scene);
-        let [width, height] = self.size.map(f64::from);
+        let [width, height] = self.size().map(f64::from);
         scene.fit_added_camera(width / height);
         let time_s = scene.data.output.time_s;
         let exposed = exposure::settle(&mut scene, time_s, width / height);
@@ -434,7 +405,7 @@ impl Viewer {
         Status {
             device: &info.name,
             driver: &info.driver,
-            size: self.size,
+            size: self.size(),
             refined: self.setup.refines.then(|| self.is_refined()),
             timings: &self.timings,
             vertices: self.frame.as_ref().map(Frame::receiver_vertex_count),

@@ -317,7 +317,7 @@ impl Frame {
 
     fn inputs(&self, permutation: &MergePermutation) -> Result<MergeInputs<'_>> {
         Ok(MergeInputs {
-            entities: Readable::shared(&self.work.entities, permutation.variant)?,
+            entities: Readable::new(&self.work.entities, permutation.variant, QUAD_FORMAT)?,
             entries: Readable::new(&self.work.entries, permutation.variant, ENTRY_FORMAT)?,
             clusters: Readable::new(&self.work.clusters, permutation.variant, CLUSTER_FORMAT)?,
             fields: Readable::new(&self.buffers.fields, permutation.variant, permutation.field_format())?,

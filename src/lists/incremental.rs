@@ -352,7 +352,7 @@ impl ClusterLists {
             scene_bounds.tree.find(|crowd| scope.leaves_dark(crowd), keep);
             let of_cluster = |cluster: usize| {
                 let scope = Scope::new(scene_bounds, receiver, entity, &self.bounds[cluster], &[]);
-                let (centre, radius_m) = scope.sphere();
+                let Scope { centre, radius_m, .. } = scope;
                 let cut = if rests { Cut::default() } else { of.far.cut(centre.as_vec3(), radius_m as f32) };
                 let middle = (centre - scene_bounds.entities[receiver].centre).as_vec3();
                 let mut sighted = Sighted { middle, cut, near: Vec::new(), distant: Vec::new() };

@@ -344,7 +344,7 @@ impl Shadowed {
         for occluder in occluders.iter().filter(nearer) {
             if occluder.range_m()[1] <= near { &mut before } else { &mut beside }.push(*occluder);
         }
-        let limits_itself = view.own().is_some_and(|own| own.range_m()[1] > near);
+        let limits_itself = view.own.is_some_and(|own| own.range_m()[1] > near);
         Shadowed { light, before, beside, limits_itself }
     }
 

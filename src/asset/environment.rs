@@ -36,20 +36,14 @@ pub struct EnvironmentData {
     /// Rotation of all parts about +y, degrees, counter-clockwise seen from above.
     #[serde(default, skip_serializing_if = "crate::field::is_default")]
     pub turn_deg: f32,
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub uniform: Option<Vec3>,
     /// A sky that brightens towards the zenith.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub gradient: Option<Gradient>,
     /// A soft directional light.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub key: Option<KeyLight>,
     /// A generated sky; `sky = {}` takes its defaults.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub sky: Option<Sky>,
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub image: Option<EnvironmentImage>,
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub sun: Option<Sun>,
 }
 

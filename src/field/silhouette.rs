@@ -148,8 +148,9 @@ impl NearMap {
 pub struct SilhouetteField {
     pub header: SilhouetteHeader,
     nodes: NodeGrid,
-    frames: Vec<MapFrame>,
-    payload: Vec<u8>,
+    pub frames: Vec<MapFrame>,
+    /// Stored bytes, as [`SilhouetteField::new`] takes them.
+    pub payload: Vec<u8>,
 }
 
 /// The byte of a number that lies between -`most` and `most`, rounded to nearest.
@@ -188,15 +189,6 @@ impl SilhouetteField {
         Ok(SilhouetteField { header, nodes, frames, payload })
     }
 
-    /// Stored bytes, as [`SilhouetteField::new`] takes them.
-    pub fn payload(&self) -> &[u8] {
-        &self.payload
-    }
-
-    pub fn frames(&self) -> &[MapFrame] {
-        &self.frames
-    }
-
     /// The field as `glsl/silhouette_field.glsl` reads it: two quads of the box around the object, then three of each
     /// node, which give places in texels from the middle of a map's first; the cells of the field's maps begin at
     /// `first_cell`.
@@ -214,7 +206,7 @@ impl SilhouetteField {
             [row(0), row(1), [texel.x, texel.y, cells, if mirrored { -1.0 } else { 1.0 }]]
         };
         let corners = self.extent().map(|corner| corner.extend(0.0).as_vec4().to_array());
-        corners.into_iter().chain(self.nodes.nodes().iter().flat_map(node)).collect()
+        corners.into_iter().chain(self.nodes.nodes.iter().flat_map(node)).collect()
     }
 
     fn side_cells(&self, side: Side) -> usize {

@@ -5,7 +5,7 @@ use crate::common::{Gpu, generate, gpu};
 use glam::{DVec3, Vec3};
 use shadow_fields::asset::Mesh;
 use shadow_fields::bake::silhouette::{SilhouetteOptions, bake_silhouette};
-use shadow_fields::check::silhouette as check;
+use shadow_fields::check::silhouette::{self as check, OFF_SCALE, OFF_SHARE, OFF_SHARE_HALVES};
 use shadow_fields::field::silhouette::{SilhouetteField, SilhouetteHeader, decode, encode};
 use shadow_fields::field::sub_light::SeenLight;
 use shadow_fields::truth::ray_mesh::RayMesh;
@@ -34,7 +34,8 @@ fn maps_are_those_of_the_twin() {
     let Some(gpu) = gpu() else { return };
     for mesh in [generate::torus(1.0, 0.3, 24, 12), generate::teapot(2), generate::sphere(0.5, 2)] {
         let apart = check::compare(&gpu.baker(), &mesh).unwrap();
-        assert!(apart.passes(), "{}: {apart:?}", mesh.name);
+        let passes = apart.whole <= OFF_SHARE && apart.halves <= OFF_SHARE_HALVES && apart.scale <= OFF_SCALE;
+        assert!(passes, "{}: {apart:?}", mesh.name);
     }
 }
 
@@ -176,9 +177,9 @@ fn receivers_and_lights_within_the_bounding_sphere_see_what_lies_between_them() 
     ] {
         let field = bake(&gpu, &mesh, SilhouetteOptions::default());
         assert!(
-            field.has_halves() != mesh.is_convex() && field.payload().len() <= 600 * 1024,
+            field.has_halves() != mesh.is_convex() && field.payload.len() <= 600 * 1024,
             "{} bytes",
-            field.payload().len()
+            field.payload.len()
         );
         let shape = RayMesh::new(&mesh);
         for (inside, limit) in ["receivers", "lights"].into_iter().zip(limits) {
@@ -238,16 +239,16 @@ fn a_file_keeps_everything_and_its_header_is_not_believed() {
     let path = folder.path().join("pot.sf");
     field.write(&path).unwrap();
     let read = SilhouetteField::read(&path).unwrap();
-    assert_eq!((&read.header, read.payload()), (&field.header, field.payload()));
-    assert_eq!(read.frames(), field.frames());
+    assert_eq!((&read.header, &read.payload), (&field.header, &field.payload));
+    assert_eq!(read.frames, field.frames);
     let mut header = field.header.clone();
     header.cells = 3;
-    assert!(SilhouetteField::new(header.clone(), field.payload().to_vec()).is_err(), "maps are missing");
+    assert!(SilhouetteField::new(header.clone(), field.payload.clone()).is_err(), "maps are missing");
     header.cells = u32::MAX;
-    assert!(SilhouetteField::new(header, field.payload().to_vec()).is_err(), "cells are out of range");
+    assert!(SilhouetteField::new(header, field.payload.clone()).is_err(), "cells are out of range");
     // Twice as many are 2 within 32 bits.
     let header = SilhouetteHeader { half_px: (1 << 31) + 1, ..field.header.clone() };
-    assert!(SilhouetteField::new(header, field.payload().to_vec()).is_err(), "halves are out of range");
+    assert!(SilhouetteField::new(header, field.payload.clone()).is_err(), "halves are out of range");
 }
 
 /// What is stored lies as near as a byte can to the number.

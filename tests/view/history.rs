@@ -37,7 +37,7 @@ fn any_command() -> impl Strategy<Value = Command> {
 }
 
 fn row_commands(row: usize) -> Vec<Command> {
-    let commands = CONTROLS[row].commands();
+    let commands: Vec<Command> = CONTROLS[row].bindings.iter().map(|(.., command)| *command).collect();
     if commands.is_empty() { vec![Command::DragEnd, Command::EndSlide] } else { commands }
 }
 

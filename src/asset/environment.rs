@@ -255,7 +255,7 @@ impl Environment {
             sun.as_ref().map(Sun::disc).into_iter().chain(self.dome.as_ref().map(|dome| dome.disc())).collect();
         if let (Some(picture), Some(image)) = (&self.picture, image) {
             let scaled = |disc: &Disc| Disc { radiance: disc.radiance * f64::from(image.scale), ..*disc };
-            all.extend(picture.lights().iter().map(scaled));
+            all.extend(picture.lights.iter().map(scaled));
         }
         let turn = self.turn();
         let placed = |disc: Disc| Disc {

@@ -11,7 +11,7 @@ fn random(rng: &mut Rng, bands: usize) -> Vec<f64> {
 }
 
 fn multiply(tensor: &Tensor, a: &[f64], b: &[f64]) -> Vec<f64> {
-    let mut out = vec![f64::NAN; coefficient_count(tensor.bands())];
+    let mut out = vec![f64::NAN; coefficient_count(tensor.bands)];
     tensor.multiply(a, b, &mut out);
     out
 }

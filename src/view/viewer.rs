@@ -83,16 +83,18 @@ pub(super) enum Leave {
 /// An editor with everything that is needed to show it.
 pub struct Viewer {
     pub(super) setup: Setup,
-    pub(super) editor: Editor,
+    pub editor: Editor,
     pub(super) input: Input,
     pub(super) baker: Baker,
-    pub(super) frame: Option<Frame>,
+    /// The frame, once its fields are baked.
+    pub frame: Option<Frame>,
     /// The scene without shadows, or lit on coarse surfaces, while the first bake takes longer than a moment.
     pub(super) preview: Option<Frame>,
-    pub(super) previewed: Previewed,
+    /// What is shown in place of the frame until its fields are baked.
+    pub previewed: Previewed,
     pub(super) show: Show,
     pub(super) overlay: Overlay,
-    pub(super) egui: egui::Context,
+    pub egui: egui::Context,
     pub(super) paint: Paint,
     pub(super) flights: VecDeque<Flight>,
     /// Changes that no frame shows yet.
@@ -108,11 +110,13 @@ pub struct Viewer {
     /// Counts every change of the light on vertices.
     pub(super) version: u64,
     pub(super) watch: Option<Watch>,
-    pub(super) shader_error: Option<String>,
+    /// The compiler's messages about the last change of a shader file.
+    pub shader_error: Option<String>,
     pub(super) messages: VecDeque<Message>,
     pub(super) timings: VecDeque<Vec<Timing>>,
     pub(super) edges: HashMap<usize, Edges>,
-    pub(super) quit: bool,
+    /// Whether the window is to close.
+    pub quit: bool,
     /// Of which way to leave the scene it was said that it loses edits, since the last edit.
     pub(super) asked_to_leave: Option<Leave>,
     /// Time at which the picture is refined, unless anything moves before.
@@ -123,7 +127,8 @@ pub struct Viewer {
     /// The progress that was shown last.
     pub(super) told: [Option<TaskProgress>; 2],
     pub(super) frame_count: u64,
-    pub(super) build_count: u64,
+    /// Scenes prepared for drawing so far, the same one anew where lights became occluders.
+    pub build_count: u64,
     /// Frames that were drawn before the last build, until what that freed is given back.
     pub(super) drawn_before: Option<u64>,
 }
@@ -175,10 +180,6 @@ impl Viewer {
         Ok(viewer)
     }
 
-    pub fn editor(&self) -> &Editor {
-        &self.editor
-    }
-
     pub fn rescued(&mut self, error: Error) -> Error {
         self.editor.rescued(error)
     }
@@ -188,27 +189,9 @@ impl Viewer {
         self.editor.window()
     }
 
-    /// The frame, once its fields are baked.
-    pub fn frame(&self) -> Option<&Frame> {
-        self.frame.as_ref()
-    }
-
-    pub fn egui(&self) -> &egui::Context {
-        &self.egui
-    }
-
-    pub fn wants_to_quit(&self) -> bool {
-        self.quit
-    }
-
     /// Whether the pointer drags the scene or an entity.
     pub fn is_dragging(&self) -> bool {
         self.input.is_dragging()
-    }
-
-    /// What is shown in place of the frame until its fields are baked.
-    pub fn previewed(&self) -> Previewed {
-        self.previewed
     }
 
     /// Whether a background bake is running, or may have to.
@@ -229,16 +212,6 @@ impl Viewer {
     /// Whether the error's colours are up to date.
     pub fn shows_error_colors(&self) -> bool {
         self.editor.error && self.error_shown.as_ref().is_some_and(|(version, ..)| *version == self.version)
-    }
-
-    /// The compiler's messages about the last change of a shader file.
-    pub fn shader_error(&self) -> Option<&str> {
-        self.shader_error.as_deref()
-    }
-
-    /// Scenes prepared for drawing so far, the same one anew where lights became occluders.
-    pub fn build_count(&self) -> u64 {
-        self.build_count
     }
 
     pub fn wants_frame(&self) -> bool {

@@ -85,7 +85,7 @@ impl Stand {
     }
 
     pub fn ready(&mut self) {
-        self.until("a first frame", |viewer| viewer.frame().is_some() && !viewer.is_baking());
+        self.until("a first frame", |viewer| viewer.frame.is_some() && !viewer.is_baking());
     }
 
     /// What is shown, RGBA.
@@ -97,7 +97,7 @@ impl Stand {
 
     /// The state rendered by a frame of its own, encoded.
     pub fn rendered(&self, scene: &Scene) -> Vec<[u8; 4]> {
-        let editor = self.viewer.editor();
+        let editor = &self.viewer.editor;
         let baker = Baker::new(&self.gpu.device, &self.gpu.library);
         let cache = Cache::new(Some(&self.cache));
         let mut frame = Frame::new(&baker, &cache, scene, self.options, &|_, _, _| ()).unwrap();

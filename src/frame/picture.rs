@@ -11,7 +11,7 @@ use crate::draw::smooth::Lines;
 use crate::draw::triangles::DrawnSurface;
 use crate::draw::{Antialias, Draw, DrawnViewport, PictureLights};
 use crate::error::Result;
-use crate::gpu::{Buffer, BufferKind, Device, Image, Timing};
+use crate::gpu::{Buffer, BufferKind, Device, Image};
 use crate::scene::Placement;
 use crate::shaders::Library;
 use half::f16;
@@ -171,12 +171,6 @@ impl Frame {
             vertices: &self.buffers.vertices,
             shown_lights: self.reflections.as_ref().map(|reflections| &reflections.shown_lights),
         })
-    }
-
-    /// Pixels of a picture that evaluated sharp lights themselves, by the timings of its passes. `None` where the device
-    /// does not count, or no pixel was to.
-    pub fn pixels_evaluated(&self, timings: &[Timing]) -> Option<u64> {
-        timings.iter().find_map(|timing| timing.samples)
     }
 
     /// Makes pictures of another size from now on.

@@ -3,10 +3,9 @@
 use super::Frame;
 use crate::field::cuboid::Cuboid;
 use crate::field::quantity::channel_stride;
-use crate::field::self_visibility;
 use crate::field::sheet::{Rectangle, Sheet};
 use crate::field::sub_light::LampFace;
-use crate::field::{Area, Fit};
+use crate::field::{Area, Fit, self_visibility};
 use crate::layout::{self, CLUSTER_VERTICES, NONE};
 use crate::lists::gather::{ClusterBounds, EntityBounds, Globe, OutlineShape, OutlineView, SceneBounds};
 use crate::lists::incremental::{Member, State};

@@ -2,8 +2,7 @@
 
 use super::Frame;
 use crate::asset::edges::Line;
-use crate::draw::smooth;
-use crate::draw::{DrawnEntity, DrawnPaint, camera};
+use crate::draw::{DrawnEntity, DrawnPaint, camera, smooth};
 use crate::lists::sight::{self, Sight};
 use crate::scene::Placement;
 use glam::{DVec3, Vec3};

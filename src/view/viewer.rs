@@ -275,10 +275,11 @@ impl Viewer {
     pub fn update(&mut self, dt_s: f64) -> Result<()> {
         self.catch_up()?;
         self.give_back();
-        let forgot = self.forget_messages();
+        let message_count = self.messages.len();
+        self.messages.retain(|message| message.since.elapsed() < SHOWN);
         let progress =
             [self.bake.as_ref().map(BackgroundTask::progress), self.rays.as_ref().map(BackgroundTask::progress)];
-        if forgot || progress != self.told {
+        if message_count != self.messages.len() || progress != self.told {
             self.told = progress;
             self.pending.display = true;
         }
@@ -417,13 +418,6 @@ impl Viewer {
         log::info!("message: {text}");
         self.messages.push_back(Message { since: Instant::now(), text, insists });
         self.pending |= Changed { display: true, ..Changed::default() };
-    }
-
-    /// Forgets messages that were shown long enough. Returns whether there were any.
-    pub(super) fn forget_messages(&mut self) -> bool {
-        let count = self.messages.len();
-        self.messages.retain(|message| message.since.elapsed() < SHOWN);
-        count != self.messages.len()
     }
 
     /// Returns `Device` and `Unsupported` errors; all other errors become messages.

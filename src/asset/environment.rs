@@ -238,10 +238,6 @@ impl Environment {
         Ok(Self { source: source.clone(), picture, dome })
     }
 
-    pub fn source(&self) -> &EnvironmentData {
-        &self.source
-    }
-
     /// Whether the radiance is 0 in all directions, [`Environment::discs`] left out.
     pub fn is_none(&self) -> bool {
         self.source.has_at_most_a_sun() || self.source.strength == 0.0

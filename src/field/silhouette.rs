@@ -193,7 +193,8 @@ impl SilhouetteField {
     /// node, which give places in texels from the middle of a map's first; the cells of the field's maps begin at
     /// `first_cell`.
     pub fn node_quads(&self, first_cell: u32) -> Vec<[f32; 4]> {
-        let map_cells = Side::ALL.iter().map(|side| self.side_cells(*side)).sum::<usize>() as u32;
+        let side_cells = |side| self.header.edge_px(side).saturating_sub(1).pow(2);
+        let map_cells = Side::ALL.map(side_cells).iter().sum::<usize>() as u32;
         let node = |&(map, mirrored): &(usize, bool)| {
             let MapFrame { axes, centre, half, .. } = self.frames[map];
             let px = f64::from(self.header.map_px);
@@ -207,10 +208,6 @@ impl SilhouetteField {
         };
         let corners = self.extent().map(|corner| corner.extend(0.0).as_vec4().to_array());
         corners.into_iter().chain(self.nodes.nodes.iter().flat_map(node)).collect()
-    }
-
-    fn side_cells(&self, side: Side) -> usize {
-        self.header.edge_px(side).saturating_sub(1).pow(2)
     }
 
     pub fn has_halves(&self) -> bool {

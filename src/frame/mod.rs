@@ -115,7 +115,7 @@ impl Frame {
         let mut scene = scene.clone();
         let links: Vec<_> = baked.surface_of.iter().map(|&surface| baked.surfaces[surface].links.clone()).collect();
         let rigid = std::mem::take(&mut baked.rigid);
-        scene.set_surfaces(baked.surface_of.iter().map(|&surface| baked.surfaces[surface].mesh.clone()).collect());
+        scene.surfaces = baked.surface_of.iter().map(|&surface| baked.surfaces[surface].mesh.clone()).collect();
         let buffers = SceneBuffers::new(device, &scene, &options.bake, baked)?;
         let entity_count = scene.entities.len();
         let wanted = options.variant.unwrap_or_else(|| calibrate::best_known(device));

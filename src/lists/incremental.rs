@@ -69,8 +69,8 @@ pub(crate) struct ClusterLists {
     differs: Vec<bool>,
     groups: Vec<WatchedGroup>,
     now: Option<State>,
-    /// Every cluster has changed since the last update by something that no [`State`] holds.
-    renewed: bool,
+    /// Every cluster has changed since the last update by something that no [`State`] holds, as the sky.
+    pub renewed: bool,
     stale: Vec<bool>,
 }
 
@@ -183,11 +183,6 @@ impl ClusterLists {
     /// Forgets what was merged: the next update takes every cluster.
     pub fn forget(&mut self) {
         self.now = None;
-    }
-
-    /// Marks every cluster dirty, as when the sky has changed.
-    pub fn renew(&mut self) {
-        self.renewed = true;
     }
 
     /// Brings the lists to this time and returns the clusters to merge: those that have changed, and where `sights` are

@@ -117,21 +117,8 @@ impl Editor {
         self.scene.data.output.white()
     }
 
-    pub fn exposure_ev(&self) -> f32 {
-        self.scene.data.output.exposure_ev()
-    }
-
-    pub fn sky(&self) -> f32 {
-        self.scene.data.environment.strength
-    }
-
-    /// Angle of the distant light, degrees, -180 to 180.
-    pub fn sky_turn_deg(&self) -> f32 {
-        self.scene.data.environment.turn_deg
-    }
-
     pub fn undo_count(&self) -> usize {
-        self.history.undo_count()
+        self.history.done.len()
     }
 
     /// Advances the time by `dt_s` seconds if the motion runs. Placements depend only on the sum of all `dt_s`.

@@ -171,7 +171,7 @@ impl Viewer {
         let Some(frame) = &mut self.frame else { return Err(Error::Failed("no picture has been drawn yet".into())) };
         let [width, height] = frame.size();
         let placements = self.editor.placements();
-        let ev = self.editor.exposure_ev();
+        let ev = self.editor.scene().data.output.exposure_ev();
         let white = self.editor.white();
         let png = free_name(&self.editor.save_path());
         let exr = png.with_extension("exr");

@@ -77,7 +77,7 @@ proptest! {
         prop_assert_eq!(&editor.scene().data.entities, &start.data.entities);
         prop_assert_eq!(&editor.scene().entities, &start.entities);
         prop_assert_eq!(&editor.scene().data.environment, &start.data.environment);
-        prop_assert_eq!(editor.exposure_ev(), start.data.output.exposure_ev());
+        prop_assert_eq!(editor.scene().data.output.exposure_ev(), start.data.output.exposure_ev());
         (0..undone).for_each(|_| drop(editor.apply(Command::Redo)));
         prop_assert_eq!(&editor.scene().data.entities, &end.entities);
         prop_assert_eq!(&editor.scene().data.environment, &end.environment);

@@ -1,4 +1,5 @@
-//! Records the source revision for result files, and refuses to build where no shader compiler can be linked.
+//! Records the source revision for result files, lists the shaders and scenes to embed, and refuses to build where no
+//! shader compiler can be linked.
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -6,6 +7,8 @@ use std::process::Command;
 fn main() {
     println!("cargo::rerun-if-changed=build.rs");
     record_revision();
+    list_files("shaders", "include_str", "glsl", &[""]);
+    list_files("assets", "include_bytes", "assets", &["meshes/", "scenes/"]);
     check_shaderc();
 }
 
@@ -24,6 +27,23 @@ fn record_revision() {
     {
         println!("cargo::rerun-if-changed={path}");
     }
+}
+
+/// Writes a table of files to embed, TABLE.rs: the name below `root` and the content of each, in the order of names.
+fn list_files(table: &str, content: &str, root: &str, folders: &[&str]) {
+    println!("cargo::rerun-if-changed={root}");
+    let mut names = Vec::new();
+    for folder in folders {
+        let entries = std::fs::read_dir(Path::new(root).join(folder)).expect("a folder of files to embed can be read");
+        names.extend(entries.flatten().map(|entry| format!("{folder}{}", entry.file_name().display())));
+    }
+    names.retain(|name| [".comp", ".vert", ".frag", ".glsl", ".obj", ".toml"].iter().any(|kind| name.ends_with(kind)));
+    names.sort();
+    let row = |name| format!("(\"{name}\", {content}!(concat!(env!(\"CARGO_MANIFEST_DIR\"), \"/{root}/{name}\"))),\n");
+    let rows = names.iter().map(row).collect::<String>();
+    let to = std::env::var_os("OUT_DIR").expect("cargo names a folder for what is generated");
+    std::fs::write(Path::new(&to).join(format!("{table}.rs")), format!("&[\n{rows}]"))
+        .expect("the table can be written");
 }
 
 /// A combined archive has several times as many bytes; Debian's has a fifth.

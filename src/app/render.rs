@@ -13,7 +13,7 @@ use crate::gpu::Timing;
 use crate::scene::{self, Placement, Scene, light, values::NUMBER_LIMIT};
 use crate::text::{self, number};
 use crate::truth::pixels::{self, RayPicture};
-use crate::truth::{self, ErrorMap, World, error_map, raycast::RayCast};
+use crate::truth::{self, EntityRadiosity, ErrorMap, World, error_map, raycast::RayCast};
 use clap::Args;
 use serde_json::{Value, json};
 use std::fmt::Write;
@@ -277,13 +277,14 @@ impl<'a> Rendering<'a> {
         let last = self.last();
         let cast = self.rays();
         let (Some(path), Some(frame)) = (&self.arguments.vertices, &mut self.frame) else { return Ok(()) };
-        if self.arguments.reference {
-            light_by_rays(frame, &last, &cast)?;
+        let lit = if self.arguments.reference {
+            truth::picture(frame.scene(), &last, &cast).0
         } else {
             // What no picture showed is lit for this.
             frame.render(&last, None)?;
-        }
-        text::write(path, vertex_table(frame, &last)?)
+            error_map::radiosity(frame)?
+        };
+        text::write(path, vertex_table(frame.scene(), &last, &lit))
     }
 
     /// Compares the last picture's vertices with ray casting, where that is asked for.
@@ -303,7 +304,8 @@ impl<'a> Rendering<'a> {
         let options = &self.options;
         let pictures = self.timings.iter().map(|(time_s, wall, passes)| {
             let named = |t: &Timing| (format!("{}_ms", t.pass.replace(' ', "_")), json!(t.milliseconds));
-            let evaluated = frame.and_then(|frame| frame.pixels_evaluated(passes));
+            // Only pixels that evaluate sharp lights are counted, where the device can.
+            let evaluated = passes.iter().find_map(|timing| timing.samples);
             let passes: serde_json::Map<_, _> = passes.iter().map(named).collect();
             json!({
                 "time_s": time_s, "frame_ms": wall.as_secs_f64() * 1e3, "passes": passes,
@@ -375,33 +377,25 @@ fn announce(global: &Global, context: &Context, options: &frame::Options) -> Res
     Ok(())
 }
 
-/// Replaces what the merge would find at vertices by what rays find there.
-fn light_by_rays(frame: &mut Frame, placements: &[Placement], cast: &RayCast) -> Result<()> {
-    let (lit, _) = truth::picture(frame.scene(), placements, cast);
-    for (entity, radiosity) in lit {
-        frame.set_radiosity(entity, &radiosity)?;
-    }
-    Ok(())
-}
-
 /// A row a vertex of every receiver, world frame.
-fn vertex_table(frame: &Frame, placements: &[Placement]) -> Result<String> {
+fn vertex_table(scene: &Scene, placements: &[Placement], lit: &[EntityRadiosity]) -> String {
     let mut text = String::from("entity,x,y,z,nx,ny,nz,r,g,b\n");
-    for (index, entity) in frame.scene().entities.iter().enumerate().filter(|(_, e)| e.receives) {
-        let mesh = frame.scene().surface(index);
-        let placement = &placements[index];
+    for (index, radiosity) in lit {
+        let entity = &scene.entities[*index];
+        let mesh = scene.surface(*index);
+        let placement = &placements[*index];
         let name = if entity.name.contains([',', '"', '\n']) {
             format!("\"{}\"", entity.name.replace('"', "\"\""))
         } else {
             entity.name.clone()
         };
         let rotation = placement.turn();
-        for ((position, normal), [r, g, b]) in mesh.positions.iter().zip(&mesh.normals).zip(frame.radiosity(index)?) {
+        for ((position, normal), [r, g, b]) in mesh.positions.iter().zip(&mesh.normals).zip(radiosity) {
             let p = placement.position.as_dvec3() + rotation * (position.as_dvec3() * f64::from(placement.scale));
             let n = rotation * normal.as_dvec3();
             let [p, n] = [p.as_vec3(), n.as_vec3()];
             let _ = writeln!(text, "{name},{},{},{},{},{},{},{r},{g},{b}", p.x, p.y, p.z, n.x, n.y, n.z);
         }
     }
-    Ok(text)
+    text
 }

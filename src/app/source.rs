@@ -3,8 +3,7 @@
 use super::{Global, output};
 use crate::asset::Mesh;
 use crate::error::{Error, Result};
-use crate::scene::Surroundings;
-use crate::scene::{self, Scene, gltf::Notes};
+use crate::scene::{self, Scene, Surroundings, gltf::Notes};
 use crate::text::number;
 use crate::truth::exposure;
 use clap::Args;

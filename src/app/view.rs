@@ -231,7 +231,7 @@ impl App<'_> {
         let mut viewer = Viewer::new(setup, editor, scale)?;
         viewer.apply(Command::Resize(own))?;
         let egui = egui_winit::State::new(
-            viewer.egui().clone(),
+            viewer.egui.clone(),
             egui::ViewportId::ROOT,
             &*window,
             Some(scale),
@@ -259,7 +259,7 @@ impl App<'_> {
         if let Err(error) = outcome {
             self.outcome = Err(error);
             events.exit();
-        } else if self.shown.as_ref().is_some_and(|shown| shown.viewer.wants_to_quit()) {
+        } else if self.shown.as_ref().is_some_and(|shown| shown.viewer.quit) {
             events.exit();
         }
     }
@@ -305,7 +305,7 @@ impl ApplicationHandler for App<'_> {
 impl Shown {
     /// egui's input, as `take_egui_input` gives it. That panics where another program has just destroyed the window.
     fn input(&mut self) -> egui::RawInput {
-        let scale = egui_winit::pixels_per_point(self.viewer.egui(), &self.window);
+        let scale = egui_winit::pixels_per_point(&self.viewer.egui, &self.window);
         let [width, height] = self.viewer.size().map(|side| side as f32 / scale);
         let input = self.egui.egui_input_mut();
         input.time = Some(self.opened.elapsed().as_secs_f64());
@@ -379,7 +379,7 @@ impl Shown {
         let output = self.viewer.ui(input)?;
         self.egui.handle_platform_output(&self.window, output);
         self.window.pre_present_notify();
-        let scene = self.viewer.editor().path();
+        let scene = self.viewer.editor.path();
         if scene != self.titled {
             self.window.set_title(&title(scene));
             self.titled = scene.to_owned();

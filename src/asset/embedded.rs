@@ -4,28 +4,8 @@ use std::path::{Component, Path, PathBuf};
 
 use crate::error::{Error, Result};
 
-macro_rules! files {
-    ($($path:literal),* $(,)?) => {
-        &[$(($path, include_bytes!(concat!("../../assets/", $path)))),*]
-    };
-}
-
-/// Paths below `assets/` and contents.
-const FILES: &[(&str, &[u8])] = files![
-    "meshes/cuboid.obj",
-    "meshes/plane.obj",
-    "meshes/sphere.obj",
-    "meshes/teapot.obj",
-    "meshes/torus.obj",
-    "meshes/torus_two_colour.obj",
-    "scenes/glowing_torus.toml",
-    "scenes/room.toml",
-    "scenes/small_lights.toml",
-    "scenes/sphere_over_plane.toml",
-    "scenes/teapot_lights.toml",
-    "scenes/torus_over_plane.toml",
-    "scenes/twelve_instances.toml",
-];
+/// Paths below `assets/` and contents of all meshes and scenes there, as the build script lists them.
+const FILES: &[(&str, &[u8])] = include!(concat!(env!("OUT_DIR"), "/assets.rs"));
 
 /// The folder that embedded paths stand in: `assets/scenes/NAME.toml`.
 pub const ROOT: &str = "assets";

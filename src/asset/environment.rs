@@ -36,20 +36,14 @@ pub struct EnvironmentData {
     /// Rotation of all parts about +y, degrees, counter-clockwise seen from above.
     #[serde(default, skip_serializing_if = "crate::field::is_default")]
     pub turn_deg: f32,
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub uniform: Option<Vec3>,
     /// A sky that brightens towards the zenith.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub gradient: Option<Gradient>,
     /// A soft directional light.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub key: Option<KeyLight>,
     /// A generated sky; `sky = {}` takes its defaults.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub sky: Option<Sky>,
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub image: Option<EnvironmentImage>,
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub sun: Option<Sun>,
 }
 
@@ -244,10 +238,6 @@ impl Environment {
         Ok(Self { source: source.clone(), picture, dome })
     }
 
-    pub fn source(&self) -> &EnvironmentData {
-        &self.source
-    }
-
     /// Whether the radiance is 0 in all directions, [`Environment::discs`] left out.
     pub fn is_none(&self) -> bool {
         self.source.has_at_most_a_sun() || self.source.strength == 0.0
@@ -261,7 +251,7 @@ impl Environment {
             sun.as_ref().map(Sun::disc).into_iter().chain(self.dome.as_ref().map(|dome| dome.disc())).collect();
         if let (Some(picture), Some(image)) = (&self.picture, image) {
             let scaled = |disc: &Disc| Disc { radiance: disc.radiance * f64::from(image.scale), ..*disc };
-            all.extend(picture.lights().iter().map(scaled));
+            all.extend(picture.lights.iter().map(scaled));
         }
         let turn = self.turn();
         let placed = |disc: Disc| Disc {

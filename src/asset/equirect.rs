@@ -34,7 +34,10 @@ pub struct Equirect {
     width: usize,
     height: usize,
     texels: Vec<[f32; 3]>,
-    lights: Vec<Disc>,
+    /// The sun and the bright windows of the picture, which its texels and coefficients no longer hold: a spot of at
+    /// most 8 degrees that sends at least a twentieth of all light, and up to three compact patches of up to 60 degrees
+    /// that stand out.
+    pub lights: Vec<Disc>,
     coefficients: [Vec<f64>; 3],
 }
 
@@ -87,13 +90,6 @@ impl Equirect {
         picture.lights = picture.take_out_lights();
         picture.coefficients = picture.project();
         Ok(picture)
-    }
-
-    /// The sun and the bright windows of the picture, which its texels and coefficients no longer hold: a spot of at
-    /// most 8 degrees that sends at least a twentieth of all light, and up to three compact patches of up to 60 degrees
-    /// that stand out.
-    pub fn lights(&self) -> &[Disc] {
-        &self.lights
     }
 
     fn take_out_lights(&mut self) -> Vec<Disc> {

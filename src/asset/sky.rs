@@ -149,10 +149,6 @@ impl Dome {
         Disc { name: "sun of the sky", toward, half_angle_rad, radiance }
     }
 
-    pub fn sun(&self) -> DVec3 {
-        self.sun
-    }
-
     /// Projection to at most [`MAX_BANDS`] bands, a list a channel.
     pub fn coefficients(&self, bands: usize) -> [&[f64]; 3] {
         self.coefficients.each_ref().map(|channel| &channel[..bands * bands])

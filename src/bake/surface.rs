@@ -104,11 +104,6 @@ impl Surface {
         (best.0 < f64::INFINITY).then_some(best.1)
     }
 
-    /// Distance of the surface from `point`. It is infinite if there are no triangles.
-    pub fn distance(&self, point: DVec3) -> f64 {
-        self.nearest(point).map_or(f64::INFINITY, |near| near.distance(point))
-    }
-
     /// Whether a point lies inside the solid that the surface bounds.
     pub fn encloses(&self, point: DVec3) -> bool {
         let boxed = point.cmpge(self.low).all() && point.cmple(self.high).all();
@@ -237,7 +232,7 @@ mod tests {
             let p = DVec3::from_array([(); 3].map(|()| 2.4 * (rng.f64() - 0.5)));
             let distance = corners.iter().map(|t| nearest_on_triangle(t.map(|c| c - p)).length());
             let distance = distance.fold(f64::INFINITY, f64::min);
-            assert!((surface.distance(p) - distance).abs() < 1e-12, "{p}");
+            assert!((surface.nearest(p).unwrap().distance(p) - distance).abs() < 1e-12, "{p}");
             let exact = corners.iter().map(|t| solid_angle(t.map(|c| c - p))).sum::<f64>() / (4.0 * PI);
             assert!((surface.winding_number(p) - exact).abs() < 0.02, "{p}: {exact}");
             inside += usize::from(exact > 0.5);

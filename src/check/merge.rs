@@ -135,9 +135,7 @@ pub fn rows(baker: &Baker, add: &mut dyn FnMut(CheckRow)) -> Result<()> {
     let mixed = scene(&format!("{MIXED}{GLASS}"))?;
     let placements = mixed.at(0.0);
     // Fields are baked once for all rows, by the device under test; nothing is read from disk.
-    let folder = tempfile::tempdir()
-        .map_err(|error| crate::error::Error::Failed(format!("no folder for temporary files: {error}")))?;
-    let cache = Cache::new(Some(folder.path()));
+    let cache = Cache::new(None);
     let mut compare = |what: String, options: frame::Options| -> Result<()> {
         let mut frame = Frame::new(baker, &cache, &mixed, options, &|_, _, _| ())?;
         let worst = against_twin(&mut frame, &placements)?;

@@ -31,13 +31,6 @@ pub struct Apart {
     pub scale: f64,
 }
 
-impl Apart {
-    /// Whether all of it is within the limits.
-    pub fn passes(&self) -> bool {
-        self.whole <= OFF_SHARE && self.halves <= OFF_SHARE_HALVES && self.scale <= OFF_SCALE
-    }
-}
-
 /// Bakes a small field of `mesh` and compares all of its texels.
 pub fn compare(baker: &Baker, mesh: &Mesh) -> Result<Apart> {
     let options = SilhouetteOptions { cells: 2, map_px: 32, view_px: 128, levels: false };
@@ -49,7 +42,7 @@ pub fn compare(baker: &Baker, mesh: &Mesh) -> Result<Apart> {
         let mut off = 0_u32;
         let mut texels = 0_u32;
         let px = field.header.edge_px(side) as u32;
-        for (map, frame) in field.frames().iter().enumerate() {
+        for (map, frame) in field.frames.iter().enumerate() {
             let twin = silhouette_twin(mesh, (frame, side), px, options.view_px * px / options.map_px);
             for (found, twin) in field.texels(map, side).chunks_exact(2).zip(&twin) {
                 let steps = |i: usize| (i32::from(found[i].cast_signed()) - i32::from(twin[i].cast_signed())).abs();

@@ -309,7 +309,7 @@ impl Draw {
     /// Makes the pipelines of these surfaces, and of grids if there are `grids`, on all cores: one may take a second to
     /// compile. Others are made where they are first drawn with.
     pub fn make(&self, surfaces: &HashSet<DrawnSurface>, grids: bool) -> Result<()> {
-        let by_pixel = self.light.is_some();
+        let by_pixel = self.evaluates_pixels();
         let grid = || if grids { self.grid.make(by_pixel) } else { Ok(()) };
         let light = || {
             let holes = |wanted: bool| surfaces.iter().any(|surface| !surface.transparent && surface.holes == wanted);
@@ -339,6 +339,11 @@ impl Draw {
     fn light_of(&self, viewport: &DrawnViewport<'_>, entity: &DrawnEntity<'_>) -> Option<&Image> {
         let has_pixels = viewport.pixel.is_some() && entity.by_pixel.is_some();
         self.light.as_ref().filter(|_| has_pixels).map(LightImages::light)
+    }
+
+    /// Whether pixels evaluate sharp lights themselves.
+    pub fn evaluates_pixels(&self) -> bool {
+        self.light.is_some()
     }
 
     pub fn samples(&self) -> u32 {

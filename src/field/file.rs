@@ -55,12 +55,8 @@ pub fn read<H: DeserializeOwned>(path: &Path, magic: [u8; 8]) -> Result<(H, Vec<
     read_from(file, size, path, magic)
 }
 
-/// As [`read`], of the bytes of the file `path`.
-pub fn parse<H: DeserializeOwned>(bytes: &[u8], path: &Path, magic: [u8; 8]) -> Result<(H, Vec<u8>)> {
-    read_from(bytes, bytes.len() as u64, path, magic)
-}
-
-fn read_from<H: DeserializeOwned>(
+/// As [`read`], of the bytes of the file `path`, which are that many.
+pub fn read_from<H: DeserializeOwned>(
     mut bytes: impl Read,
     size: u64,
     path: &Path,

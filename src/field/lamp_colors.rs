@@ -45,7 +45,7 @@ impl LampColors {
         let mut quads = Vec::new();
         for planes in &self.planes {
             let node = |&(map, opposite): &(usize, bool)| planes[map][usize::from(opposite)];
-            quads.extend(self.nodes.nodes().iter().flat_map(node).map(|quad| quad.as_vec4().to_array()));
+            quads.extend(self.nodes.nodes.iter().flat_map(node).map(|quad| quad.as_vec4().to_array()));
         }
         quads
     }

@@ -56,7 +56,6 @@ pub struct Lattice {
     /// the first and last lie on edges and are shared with the neighbours. If not, each row has `cells` samples at the
     /// cells' centres, between copies of the neighbours' samples. Both take the same bytes; the first has finer steps.
     /// `None` leaves that to the bake and counts as centres until then.
-    #[serde(default)]
     pub edges: Option<bool>,
 }
 

@@ -148,8 +148,9 @@ impl NearMap {
 pub struct SilhouetteField {
     pub header: SilhouetteHeader,
     nodes: NodeGrid,
-    frames: Vec<MapFrame>,
-    payload: Vec<u8>,
+    pub frames: Vec<MapFrame>,
+    /// Stored bytes, as [`SilhouetteField::new`] takes them.
+    pub payload: Vec<u8>,
 }
 
 /// The byte of a number that lies between -`most` and `most`, rounded to nearest.
@@ -188,20 +189,12 @@ impl SilhouetteField {
         Ok(SilhouetteField { header, nodes, frames, payload })
     }
 
-    /// Stored bytes, as [`SilhouetteField::new`] takes them.
-    pub fn payload(&self) -> &[u8] {
-        &self.payload
-    }
-
-    pub fn frames(&self) -> &[MapFrame] {
-        &self.frames
-    }
-
     /// The field as `glsl/silhouette_field.glsl` reads it: two quads of the box around the object, then three of each
     /// node, which give places in texels from the middle of a map's first; the cells of the field's maps begin at
     /// `first_cell`.
     pub fn node_quads(&self, first_cell: u32) -> Vec<[f32; 4]> {
-        let map_cells = Side::ALL.iter().map(|side| self.side_cells(*side)).sum::<usize>() as u32;
+        let side_cells = |side| self.header.edge_px(side).saturating_sub(1).pow(2);
+        let map_cells = Side::ALL.map(side_cells).iter().sum::<usize>() as u32;
         let node = |&(map, mirrored): &(usize, bool)| {
             let MapFrame { axes, centre, half, .. } = self.frames[map];
             let px = f64::from(self.header.map_px);
@@ -214,11 +207,7 @@ impl SilhouetteField {
             [row(0), row(1), [texel.x, texel.y, cells, if mirrored { -1.0 } else { 1.0 }]]
         };
         let corners = self.extent().map(|corner| corner.extend(0.0).as_vec4().to_array());
-        corners.into_iter().chain(self.nodes.nodes().iter().flat_map(node)).collect()
-    }
-
-    fn side_cells(&self, side: Side) -> usize {
-        self.header.edge_px(side).saturating_sub(1).pow(2)
+        corners.into_iter().chain(self.nodes.nodes.iter().flat_map(node)).collect()
     }
 
     pub fn has_halves(&self) -> bool {

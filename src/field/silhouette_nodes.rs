@@ -11,7 +11,7 @@ use std::collections::HashMap;
 pub struct NodeGrid {
     cells: u32,
     /// Map and whether the node is the opposite of the map's direction, by face, row and column.
-    nodes: Vec<(usize, bool)>,
+    pub nodes: Vec<(usize, bool)>,
     directions: Vec<DVec3>,
 }
 
@@ -78,11 +78,6 @@ impl NodeGrid {
         self.directions[map]
     }
 
-    /// Map and mirroring of every node, by face, row and column.
-    pub fn nodes(&self) -> &[(usize, bool)] {
-        &self.nodes
-    }
-
     /// The cell around a direction of any length but 0.
     pub fn cell(&self, toward: DVec3) -> Cell {
         let (face, s, t) = face_st(toward);
@@ -124,8 +119,8 @@ mod tests {
     fn opposite_nodes_share_a_map_and_weights_lead_back_to_the_direction() {
         for cells in [1, 2, 5, 8] {
             let grid = NodeGrid::new(cells);
-            assert_eq!(grid.nodes().len(), (6 * (cells + 1) * (cells + 1)) as usize);
-            assert!(grid.nodes().iter().any(|(_, mirrored)| *mirrored));
+            assert_eq!(grid.nodes.len(), (6 * (cells + 1) * (cells + 1)) as usize);
+            assert!(grid.nodes.iter().any(|(_, mirrored)| *mirrored));
             let mut rng = fastrand::Rng::with_seed(7);
             for _ in 0..500 {
                 let toward = DVec3::from_array([0; 3].map(|_| 2.0 * rng.f64() - 1.0)).normalize();

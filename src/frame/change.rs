@@ -43,7 +43,7 @@ impl Frame {
         }
         let surfaces = (0..scene.entities.len()).map(|entity| self.scene.surface(entity).clone()).collect();
         self.scene = scene.clone();
-        self.scene.set_surfaces(surfaces);
+        self.scene.surfaces = surfaces;
         self.methods = methods(scene, self.options.lights);
         // A shader that knows of lights serves a scene without them as well.
         if harmonic_lights(scene, &self.methods) && !self.merge.permutation.lights {
@@ -53,7 +53,7 @@ impl Frame {
             self.forget();
         }
         if sky {
-            self.work.lists.renew();
+            self.work.lists.renewed = true;
             self.sky.write(scene, self.options.bake.bands)?;
             self.reflections.as_mut().map_or(Ok(()), |reflections| reflections.set_sky(&scene.environment))?;
         }

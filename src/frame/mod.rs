@@ -34,9 +34,8 @@ use crate::gloss::Reflections;
 use crate::gpu::{self, Buffer, Commands, Device, Timing};
 use crate::layout::{CLUSTER_FORMAT, ENTRY_FORMAT, QUAD_FORMAT};
 use crate::lists::incremental::{ClusterLists, Merged};
-use crate::merge::calibrate;
 use crate::merge::variant::{MergePermutation, Reads, Variant, uniform_entities};
-use crate::merge::{Merge, MergeInputs, Readable};
+use crate::merge::{Merge, MergeInputs, Readable, calibrate};
 use crate::scene::groups::Groups;
 use crate::scene::{LightMethod, Lights, Placement, Scene, light};
 use crate::scene_buffers::{SceneBuffers, limits};
@@ -88,8 +87,6 @@ pub struct Frame {
     sharp: Option<Sharp>,
     work: ClusterWork,
     sky: SkyLight,
-    /// How pixels evaluate sharp lights themselves, where pictures want it.
-    pixels: Option<SharpPermutation>,
     /// Chains of sharp lights for pixels, once a picture evaluates any.
     chains: Option<PixelChains>,
     radiosity: RadiosityBuffers,
@@ -118,7 +115,7 @@ impl Frame {
         let mut scene = scene.clone();
         let links: Vec<_> = baked.surface_of.iter().map(|&surface| baked.surfaces[surface].links.clone()).collect();
         let rigid = std::mem::take(&mut baked.rigid);
-        scene.set_surfaces(baked.surface_of.iter().map(|&surface| baked.surfaces[surface].mesh.clone()).collect());
+        scene.surfaces = baked.surface_of.iter().map(|&surface| baked.surfaces[surface].mesh.clone()).collect();
         let buffers = SceneBuffers::new(device, &scene, &options.bake, baked)?;
         let entity_count = scene.entities.len();
         let wanted = options.variant.unwrap_or_else(|| calibrate::best_known(device));
@@ -211,7 +208,6 @@ impl Frame {
             radiosity,
             picture,
             reflections,
-            pixels,
             chains: None,
             bounce,
             buffers,
@@ -235,7 +231,11 @@ impl Frame {
     }
 
     fn light_and_draw(&mut self, placements: &[Placement], white: Option<f32>, reads: bool) -> Result<Vec<Timing>> {
-        let outcome = self.try_light_and_draw(placements, white, reads);
+        let viewports: &[Viewport] = if white.is_some() { &[self.whole()] } else { &[] };
+        let outcome = self.prepare(placements, viewports, Relight::Seen).and_then(|()| {
+            let picture = white.map(|white| self.picture_work(placements, white));
+            self.run(self.merge_work()?.as_ref(), picture.as_ref(), reads)
+        });
         if outcome.is_err() {
             // The device may have run none of it, so every cluster must be merged again.
             self.forget();
@@ -243,23 +243,17 @@ impl Frame {
         outcome
     }
 
-    fn try_light_and_draw(&mut self, placements: &[Placement], white: Option<f32>, reads: bool) -> Result<Vec<Timing>> {
-        let viewports: &[Viewport] = if white.is_some() { &[self.whole()] } else { &[] };
-        self.prepare(placements, viewports, Relight::Seen)?;
-        let picture = white.map(|white| self.picture_work(placements, white));
-        self.run(self.merge_work()?.as_ref(), picture.as_ref(), reads)
-    }
-
-    /// Draws the picture from the radiosity as it stands, the last merge's or what [`Frame::set_radiosity`] put there.
+    /// Draws the picture from the radiosity as it stands.
     pub fn redraw(&mut self, placements: &[Placement], white: f32) -> Result<Vec<Timing>> {
-        let viewport = Viewport { by_vertex: self.radiosity.replaced, ..self.whole() };
-        self.prepare(placements, &[viewport], Relight::Nothing)?;
+        self.prepare(placements, &[self.whole()], Relight::Nothing)?;
         self.run(None, Some(&self.picture_work(placements, white)), true)
     }
 
-    /// As [`Frame::redraw`] for values that are not radiance: no emission, no limit to white, and the given background.
-    pub fn redraw_unlit(&mut self, placements: &[Placement], background: [f32; 3]) -> Result<Vec<Timing>> {
-        let viewport = Viewport { adds_emission: false, by_vertex: true, ..self.whole() };
+    /// Draws the comparison at place 0 ([`Frame::set_comparison`]), of values that are not radiance: no emission, no
+    /// limit to white, and the given background.
+    pub fn draw_comparison(&mut self, placements: &[Placement], background: [f32; 3]) -> Result<Vec<Timing>> {
+        let radiosity = RadiositySource::Comparison(0);
+        let viewport = Viewport { radiosity, adds_emission: false, ..self.whole() };
         self.prepare(placements, &[viewport], Relight::Nothing)?;
         let picture = self.picture_work(placements, f32::INFINITY);
         self.run(None, Some(&PictureWork { background: background.into(), ..picture }), true)
@@ -325,7 +319,7 @@ impl Frame {
 
     fn inputs(&self, permutation: &MergePermutation) -> Result<MergeInputs<'_>> {
         Ok(MergeInputs {
-            entities: Readable::shared(&self.work.entities, permutation.variant)?,
+            entities: Readable::new(&self.work.entities, permutation.variant, QUAD_FORMAT)?,
             entries: Readable::new(&self.work.entries, permutation.variant, ENTRY_FORMAT)?,
             clusters: Readable::new(&self.work.clusters, permutation.variant, CLUSTER_FORMAT)?,
             fields: Readable::new(&self.buffers.fields, permutation.variant, permutation.field_format())?,
@@ -338,14 +332,6 @@ impl Frame {
 
     fn order(&self, entity: usize) -> &[u32] {
         &self.buffers.surface(entity).order
-    }
-
-    /// Replaces the radiosity of an entity's vertices, in the mesh's order, until the next merge: for pictures of what
-    /// was computed elsewhere.
-    pub fn set_radiosity(&mut self, entity: usize, radiosity: &[[f32; 3]]) -> Result<()> {
-        self.forget();
-        let order = &self.buffers.surface(entity).order;
-        self.radiosity.write(entity, order, radiosity)
     }
 
     /// Radiosity of an entity's vertices in the mesh's order: linear RGB radiance that leaves the surface, without

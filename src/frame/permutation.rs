@@ -47,7 +47,7 @@ pub(super) fn sharp(
     let lit = scene.entities.iter().zip(methods).filter(|(entity, method)| entity.emits && method.is_sharp());
     let lights: Vec<&LightMethod> = lit.map(|(_, method)| method).collect();
     let any_field = |wanted: fn(&SilhouetteField) -> bool| {
-        buffers.meshes.iter().any(|mesh| mesh.silhouette.as_ref().is_some_and(|slot| wanted(&slot.field)))
+        buffers.meshes.iter().any(|mesh| mesh.slots.silhouette.as_ref().is_some_and(|slot| wanted(&slot.content)))
     };
     let casters = scene.entities.iter().filter(|entity| entity.occludes).count();
     (!lights.is_empty()).then(|| SharpPermutation {
@@ -56,7 +56,7 @@ pub(super) fn sharp(
         silhouette: options.bake.silhouette,
         outlines: lights.contains(&&LightMethod::Outline),
         panels: lights.iter().any(|method| matches!(method, LightMethod::LampFace(_))),
-        colors: buffers.meshes.iter().any(|mesh| mesh.lamp_colors.is_some()),
+        colors: buffers.meshes.iter().any(|mesh| mesh.slots.lamp_colors.is_some()),
         halves: any_field(SilhouetteField::has_halves),
         boxes: any_field(SilhouetteField::has_box),
         sheets: merge.sheets,

@@ -11,20 +11,13 @@ use crate::draw::smooth::Lines;
 use crate::draw::triangles::DrawnSurface;
 use crate::draw::{Antialias, Draw, DrawnViewport, PictureLights};
 use crate::error::Result;
-use crate::gpu::{Buffer, BufferKind, Device, Image, Timing};
+use crate::gpu::{Buffer, BufferKind, Device, Image};
 use crate::scene::Placement;
 use crate::shaders::Library;
-use crate::sharp::SharpPermutation;
 use half::f16;
 use std::collections::HashSet;
 use std::ops::Range;
 use std::sync::Arc;
-
-pub(super) struct Drawer {
-    pub draw: Draw,
-    pixels: Option<SharpPermutation>,
-    antialias: Antialias,
-}
 
 /// The pass "draw" with its images and buffers.
 pub(super) struct FramePicture {
@@ -32,7 +25,7 @@ pub(super) struct FramePicture {
     /// Whether pictures are refined ([`Frame::refine`]).
     pub refined: bool,
     /// The other of the coarse and the refined way, once both were wanted.
-    pub other: Option<Drawer>,
+    pub other: Option<Draw>,
     /// Where the host reads a picture.
     pub readback: Buffer,
     /// Outlines and creases of the picture that was prepared last.
@@ -118,27 +111,22 @@ impl Frame {
         halves.chunks_exact(4).flat_map(|p| [p[0].to_f32(), p[1].to_f32(), p[2].to_f32()]).collect()
     }
 
-    fn drawer(&self, options: &Options) -> Result<Drawer> {
+    /// What makes pictures with these options.
+    fn draw(&self, options: &Options) -> Result<Draw> {
         let sharp = self.sharp.as_ref().map(|sharp| sharp.permutation);
         let pixels = pixel_shading(&self.device, options, &self.buffers, self.radiosity.soft(), sharp);
         let lights = PictureLights { pixels, highlights: sharp };
-        let draw = Draw::new(&self.device, &self.library, options.size, options.antialias, lights)?;
-        Ok(Drawer { draw, pixels, antialias: options.antialias })
+        Draw::new(&self.device, &self.library, options.size, options.antialias, lights)
     }
 
-    /// Makes pictures that way from now on. Returns the way in which they were made so far.
-    fn exchange(&mut self, drawer: Drawer) -> Drawer {
-        Drawer {
-            draw: std::mem::replace(&mut self.picture.draw, drawer.draw),
-            pixels: std::mem::replace(&mut self.pixels, drawer.pixels),
-            antialias: std::mem::replace(&mut self.options.antialias, drawer.antialias),
-        }
+    /// What makes refined pictures, whatever the options say of their edges.
+    fn refined_draw(&self) -> Result<Draw> {
+        self.draw(&Options { antialias: Antialias::Samples, ..self.options })
     }
 
     /// Makes pictures with these options from now on, and no others.
-    pub(super) fn set_pictures(&mut self, options: Options) -> Result<()> {
-        let drawer = self.drawer(&options)?;
-        self.exchange(drawer);
+    fn set_pictures(&mut self, options: Options) -> Result<()> {
+        self.picture.draw = self.draw(&options)?;
         self.options = options;
         self.picture.other = None;
         self.picture.refined = false;
@@ -152,14 +140,11 @@ impl Frame {
         if refined == self.picture.refined {
             return Ok(false);
         }
-        let drawer = match self.picture.other.take() {
-            Some(drawer) => drawer,
-            None => {
-                let options = Options { antialias: Antialias::Samples, ..self.options };
-                self.drawer(&options)?
-            }
+        let draw = match self.picture.other.take() {
+            Some(draw) => draw,
+            None => self.refined_draw()?,
         };
-        self.picture.other = Some(self.exchange(drawer));
+        self.picture.other = Some(std::mem::replace(&mut self.picture.draw, draw));
         self.picture.refined = refined;
         Ok(self.sharp.as_ref().is_some_and(|sharp| sharp.permutation.edges != self.wants_edges()))
     }
@@ -170,14 +155,13 @@ impl Frame {
 
     /// Whether pixels of any pictures evaluate sharp lights.
     pub(super) fn wants_edges(&self) -> bool {
-        self.pixels.is_some() || self.picture.other.as_ref().is_some_and(|other| other.pixels.is_some())
+        self.picture.draw.evaluates_pixels() || self.picture.other.as_ref().is_some_and(Draw::evaluates_pixels)
     }
 
     /// Input of pixels that evaluate sharp lights in a viewport.
     fn pixel_light(&self, viewport: &Viewport) -> Option<PixelLight<'_>> {
-        self.pixels?;
         let chains = self.chains.as_ref().filter(|chains| chains.is_ready())?;
-        viewport.shows_light().then(|| PixelLight {
+        (self.picture.draw.evaluates_pixels() && viewport.shows_light()).then(|| PixelLight {
             entities: &chains.entities,
             silhouettes: [&self.buffers.silhouettes.nodes, &self.buffers.silhouettes.cells],
             entries: &chains.entries,
@@ -189,18 +173,10 @@ impl Frame {
         })
     }
 
-    /// Pixels of a picture that evaluated sharp lights themselves, by the timings of its passes. `None` where the device
-    /// does not count, or no pixel was to.
-    pub fn pixels_evaluated(&self, timings: &[Timing]) -> Option<u64> {
-        timings.iter().find_map(|timing| timing.samples)
-    }
-
     /// Makes pictures of another size from now on.
     pub fn resize(&mut self, size: [u32; 2]) -> Result<()> {
         if size != self.options.size {
-            self.refine(false)?;
-            let options = Options { size, ..self.options };
-            self.set_pictures(options)?;
+            self.set_pictures(Options { size, ..self.options })?;
             self.picture.readback = readback(&self.device, size)?;
         }
         Ok(())
@@ -218,10 +194,10 @@ impl Frame {
     /// pixel, rows from the top; `white` as in [`Frame::render`]. Waits.
     pub fn still(&mut self, placements: &[Placement], white: f32) -> Result<Vec<f32>> {
         self.device.settle();
-        let drawer = self.drawer(&Options { antialias: Antialias::Samples, ..self.options })?;
-        let before = self.exchange(drawer);
+        let refined = self.refined_draw()?;
+        let before = std::mem::replace(&mut self.picture.draw, refined);
         let outcome = self.render(placements, Some(white)).map(|_| self.picture());
-        self.exchange(before);
+        self.picture.draw = before;
         outcome
     }
 }

@@ -1,17 +1,17 @@
 //! What an entity is to the merge at one time: its place, rotation and light; and the clusters of a receiver.
 
 use super::Frame;
+use crate::field::cuboid::Cuboid;
 use crate::field::quantity::channel_stride;
-use crate::field::self_visibility;
 use crate::field::sheet::{Rectangle, Sheet};
 use crate::field::sub_light::LampFace;
-use crate::field::{Area, Fit};
+use crate::field::{Area, Fit, self_visibility};
 use crate::layout::{self, CLUSTER_VERTICES, NONE};
 use crate::lists::gather::{ClusterBounds, EntityBounds, Globe, OutlineShape, OutlineView, SceneBounds};
 use crate::lists::incremental::{Member, State};
 use crate::lists::sight::TriangleRun;
 use crate::scene::{LightMethod, Placement};
-use crate::scene_buffers::{self, CuboidSlot, FieldSlot};
+use crate::scene_buffers::{self, FieldSlot, Slot};
 use crate::sh::rotation::turns;
 use glam::DVec3;
 use std::f64::consts::PI;
@@ -41,9 +41,9 @@ impl Frame {
     fn outlines_at(&self, placements: &[Placement]) -> Vec<Option<OutlineView>> {
         let outline = |(index, placement): (usize, &Placement)| {
             let entity = &self.scene.entities[index];
-            let shape = match (self.cuboid(index), &self.buffers.meshes[entity.mesh].silhouette) {
-                (Some(slot), _) => OutlineShape::Cuboid(slot.cuboid),
-                (_, Some(slot)) if entity.occludes => OutlineShape::Maps(slot.field.clone()),
+            let shape = match (self.cuboid(index), &self.buffers.meshes[entity.mesh].slots.silhouette) {
+                (Some(slot), _) => OutlineShape::Cuboid(slot.content),
+                (_, Some(slot)) if entity.occludes => OutlineShape::Maps(slot.content.clone()),
                 _ => return None,
             };
             Some(OutlineView { shape, to_object: placement.turn().inverse(), opaque: entity.opacity >= 1.0 })
@@ -83,8 +83,8 @@ impl Frame {
         let coloured = device_mesh.radiance.is_some() && entity.emits && !sharp;
         let source = if coloured { &device_mesh.radiance } else { &device_mesh.blocked };
         let facing = entity.spot.map(|spot| (placement.turn() * DVec3::Y, f64::from(spot.outer_deg).to_radians()));
-        let brightest = match &device_mesh.lamp_colors {
-            Some(slot) if sharp => slot.colors.brightest,
+        let brightest = match &device_mesh.slots.lamp_colors {
+            Some(slot) if sharp => slot.content.brightest,
             _ => device_mesh.radiance.as_ref().filter(|_| coloured).map_or(1.0, |s| s.header.radiance_scale.into()),
         };
         EntityBounds {
@@ -93,7 +93,7 @@ impl Frame {
             reflectance: entity.reflection().map_or(f64::from(entity.albedo.max_element()), |_| 1.0),
             occludes: entity.occludes
                 && (holds(&device_mesh.blocked)
-                    || device_mesh.silhouette.is_some()
+                    || device_mesh.slots.silhouette.is_some()
                     || device_mesh.rectangle.is_some()
                     || (self.sharp.is_some() && self.cuboid(index).is_some())),
             emits: entity.emits && (sharp || holds(source)),
@@ -114,12 +114,12 @@ impl Frame {
         let radius_m = device_mesh.radius_m * f64::from(placement.scale);
         let method = self.light_method(index);
         let is_sharp = entity.emits && method.is_sharp();
-        let emission = match (&device_mesh.radiance, &device_mesh.lamp_colors) {
-            (_, Some(slot)) if is_sharp => entity.emission * slot.colors.mean.as_vec3(),
+        let emission = match (&device_mesh.radiance, &device_mesh.slots.lamp_colors) {
+            (_, Some(slot)) if is_sharp => entity.emission * slot.content.mean.as_vec3(),
             (Some(slot), _) if entity.emits && !is_sharp => entity.emission * slot.header.radiance_scale,
             _ => entity.emission,
         };
-        let radiance_base = match (&device_mesh.radiance, &device_mesh.lamp_colors) {
+        let radiance_base = match (&device_mesh.radiance, &device_mesh.slots.lamp_colors) {
             (_, colors) if is_sharp => colors.as_ref().map_or(NONE, |slot| slot.first_quad),
             (field, _) => field.as_ref().map_or(0, FieldSlot::quad),
         };
@@ -141,7 +141,7 @@ impl Frame {
             LightMethod::Harmonics | LightMethod::Outline => [0.0; 2],
         };
         let shift = slot.map_or(Fit::ROUND.packed(), |slot| slot.header.lattice.packed());
-        let maps = device_mesh.silhouette.as_ref().map(|slot| slot.first_quad);
+        let maps = device_mesh.slots.silhouette.as_ref().map(|slot| slot.first_quad);
         layout::DeviceEntity {
             centre: centre.extend((1.0 / radius_m) as f32).to_array(),
             alpha_beta: [cos_a, sin_a, cos_b, sin_b],
@@ -181,12 +181,12 @@ impl Frame {
         let entity = &self.scene.entities[index];
         let device_mesh = &self.buffers.meshes[entity.mesh];
         let blocks = device_mesh.rectangle.is_some() || device_mesh.blocked.is_some();
-        entity.occludes && (blocks || device_mesh.silhouette.is_some() || self.cuboid(index).is_some())
+        entity.occludes && (blocks || device_mesh.slots.silhouette.is_some() || self.cuboid(index).is_some())
     }
 
     /// The box as which an entity blocks sharp lights.
-    pub(super) fn cuboid(&self, index: usize) -> Option<CuboidSlot> {
-        let slot = self.buffers.meshes[self.scene.entities[index].mesh].cuboid;
+    pub(super) fn cuboid(&self, index: usize) -> Option<Slot<Cuboid>> {
+        let slot = self.buffers.meshes[self.scene.entities[index].mesh].slots.cuboid;
         slot.filter(|_| self.scene.casts_as_box(index))
     }
 

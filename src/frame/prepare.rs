@@ -79,7 +79,6 @@ impl Frame {
         let relight = if relight == Relight::Seen && self.bounce.is_some() { Relight::Everything } else { relight };
         if relight != Relight::Nothing {
             self.fit_edges()?;
-            self.radiosity.replaced = false;
             self.prepare_merge(placements, if relight == Relight::Seen { viewports } else { &[] })?;
             self.fit_lists()?;
         }
@@ -124,7 +123,7 @@ impl Frame {
 
     /// The chains of the time that was merged last, for pictures whose pixels evaluate sharp lights.
     fn prepare_chains(&mut self) -> Result<()> {
-        if self.pixels.is_none() || !self.work.lists.is_updated() {
+        if !self.picture.draw.evaluates_pixels() || !self.work.lists.is_updated() {
             return Ok(());
         }
         let chains = match &mut self.chains {

@@ -16,8 +16,6 @@ pub(super) struct RadiosityBuffers {
     soft: Option<Buffer>,
     /// The same two before light has bounced, where it does: then the merge and the pass of sharp lights write these.
     direct: Option<Direct>,
-    /// Whether any of it was replaced by what was computed elsewhere, and not merged since.
-    pub replaced: bool,
     /// The first byte of each entity.
     pub offsets: Vec<u64>,
     comparisons: [Option<Buffer>; 2],
@@ -45,7 +43,6 @@ impl RadiosityBuffers {
             merged: Buffer::zeros(device, "radiosity", size_bytes)?,
             soft: None,
             direct: None,
-            replaced: false,
             offsets,
             comparisons: Default::default(),
         })
@@ -110,13 +107,6 @@ impl RadiosityBuffers {
             soft: self.soft.as_ref(),
             lamps: self.lamps(),
         }
-    }
-
-    /// Replaces an entity's values. They come in the mesh's order of vertices, which `order` lists as they are stored.
-    pub fn write(&mut self, entity: usize, order: &[u32], values: &[[f32; 3]]) -> Result<()> {
-        assert_eq!(values.len(), order.len(), "radiosity of entity {entity}");
-        self.replaced = true;
-        self.merged.fill(self.offsets[entity], &quads(order, values).collect::<Vec<_>>())
     }
 
     /// An entity's values in the mesh's order of vertices.

@@ -77,14 +77,12 @@ pub fn record<'f>(
         commands.pass("merge", |c| work.merge.record(c, &work.inputs, work.soft, work.cluster_count))?;
         if let Some((sharp, inputs)) = &work.sharp {
             // The pass reads what the merge has written.
-            commands.barrier(Access::ComputeWrite, Access::ComputeRead);
-            commands.barrier(Access::ComputeWrite, Access::ComputeSampled);
+            commands.computed();
             commands.pass("sharp", |c| sharp.record(c, inputs, work.radiosity, work.cluster_count))?;
         }
         if let Some((bounce, bounce_work)) = &work.bounce {
             // Direct light of every cluster, of this frame or an earlier one.
-            commands.barrier(Access::ComputeWrite, Access::ComputeRead);
-            commands.barrier(Access::ComputeWrite, Access::ComputeSampled);
+            commands.computed();
             commands.pass("bounce", |c| bounce.record(c, bounce_work))?;
         }
     }
@@ -93,8 +91,7 @@ pub fn record<'f>(
     }
     let gloss = picture.and_then(|picture| picture.gloss.as_ref());
     if let Some((reflections, inputs)) = gloss {
-        commands.barrier(Access::ComputeWrite, Access::ComputeRead);
-        commands.barrier(Access::ComputeWrite, Access::ComputeSampled);
+        commands.computed();
         commands.pass("gloss", |c| reflections.record(c, inputs))?;
     }
     if (merge.is_some() || gloss.is_some()) && picture.is_some() {

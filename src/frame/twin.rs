@@ -11,8 +11,7 @@ use crate::lists::incremental::{ClusterLists, State};
 use crate::lists::scope::Scope;
 use crate::merge::twin::{MergeObject, MergeTwin};
 use crate::scene::{Entity, LightMethod, Placement, Scene};
-use crate::scene_buffers;
-use crate::scene_buffers::DeviceSurface;
+use crate::scene_buffers::{self, DeviceSurface};
 use crate::sh::basis::coefficient_count;
 use crate::sharp::twin::{SharpLight, SharpObject, SharpTwin, SurfacePoint};
 use glam::DVec3;
@@ -186,8 +185,8 @@ impl FrameTwin<'_> {
             centre: object.centre,
             rotation: object.rotation,
             radius_m: object.radius_m,
-            silhouette: device_mesh.silhouette.as_ref().map(|slot| &*slot.field),
-            cuboid: self.frame.cuboid(index).map(|slot| slot.cuboid),
+            silhouette: device_mesh.slots.silhouette.as_ref().map(|slot| &*slot.content),
+            cuboid: self.frame.cuboid(index).map(|slot| slot.content),
             sheet: object.sheet,
             opacity: object.opacity,
         }
@@ -205,9 +204,10 @@ impl FrameTwin<'_> {
             entity,
             emission: self.frame.scene.entities[entity].emission.as_dvec3(),
             colors: self.frame.buffers.meshes[self.frame.scene.entities[entity].mesh]
+                .slots
                 .lamp_colors
                 .as_ref()
-                .map(|slot| &*slot.colors),
+                .map(|slot| &*slot.content),
             method: self.frame.light_method(entity),
             spot: self.frame.scene.entities[entity].spot,
         };

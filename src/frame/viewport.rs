@@ -2,8 +2,7 @@
 
 use super::Frame;
 use crate::asset::edges::Line;
-use crate::draw::smooth;
-use crate::draw::{DrawnEntity, DrawnPaint, camera};
+use crate::draw::{DrawnEntity, DrawnPaint, camera, smooth};
 use crate::lists::sight::{self, Sight};
 use crate::scene::Placement;
 use glam::{DVec3, Vec3};
@@ -27,19 +26,17 @@ pub struct Viewport {
     /// Whether what entities emit is added. It is not where radiosity stands for something else, as the colours of an
     /// error do.
     pub adds_emission: bool,
-    /// Whether only the radiosity of vertices is shown, and no pixel evaluates a light itself.
-    pub by_vertex: bool,
 }
 
 impl Viewport {
     /// A region that shows what the merge lights.
     pub fn merged(area: [u32; 4]) -> Self {
-        Viewport { area, radiosity: RadiositySource::Merged, adds_emission: true, by_vertex: false }
+        Viewport { area, radiosity: RadiositySource::Merged, adds_emission: true }
     }
 
     /// Whether it shows light as it is, so that pixels may add to that of vertices.
     pub(super) fn shows_light(&self) -> bool {
-        self.radiosity == RadiositySource::Merged && !self.by_vertex
+        self.radiosity == RadiositySource::Merged
     }
 }
 

@@ -86,7 +86,7 @@ impl Device {
         surface: &[&'static CStr],
         swapchain: &[&'static CStr],
     ) -> Result<Arc<Self>> {
-        let instance = Instance::new(options.validation, surface)?;
+        let instance = Arc::new(Instance::new(options.validation, surface)?);
         let devices = physical_devices(&instance.handle)?;
         let candidates: Vec<_> = devices.iter().map(|(_, candidate)| candidate.clone()).collect();
         let info = choose(&candidates, options.device.as_deref())?.clone();
@@ -94,16 +94,6 @@ impl Device {
         if info.is_software() {
             super::process::keep_freed_memory();
         }
-        Self::open(&Arc::new(instance), physical, info, swapchain, options.cache_dir.clone())
-    }
-
-    fn open(
-        instance: &Arc<Instance>,
-        physical: vk::PhysicalDevice,
-        info: Candidate,
-        extensions: &[&'static CStr],
-        cache_dir: Option<PathBuf>,
-    ) -> Result<Arc<Self>> {
         // SAFETY: a query on a handle that the live instance returned.
         let families = unsafe { instance.handle.get_physical_device_queue_family_properties(physical) };
         let queue_family = queue_family(&families).expect("a suitable candidate has a queue");
@@ -111,7 +101,7 @@ impl Device {
         let queues =
             [vk::DeviceQueueCreateInfo::default().queue_family_index(queue_family).queue_priorities(&priorities)];
         let mut core_1_3 = required_features();
-        let extension_names: Vec<_> = extensions.iter().map(|name| name.as_ptr()).collect();
+        let extension_names: Vec<_> = swapchain.iter().map(|name| name.as_ptr()).collect();
         let features = vk::PhysicalDeviceFeatures::default().occlusion_query_precise(info.counts_samples);
         let create = vk::DeviceCreateInfo::default()
             .queue_create_infos(&queues)
@@ -123,7 +113,8 @@ impl Device {
             unsafe { instance.handle.create_device(physical, &create, None) }.checked("vkCreateDevice", &info.name)?;
         // SAFETY: family and index were given at creation.
         let queue = unsafe { handle.get_device_queue(queue_family, 0) };
-        Self::complete(instance, Parts { physical, handle, queue, queue_family, info, is_shared: false }, cache_dir)
+        let parts = Parts { physical, handle, queue, queue_family, info, is_shared: false };
+        Self::complete(&instance, parts, options.cache_dir.clone())
     }
 
     /// A device of its parts: made here, or shared by a caller.

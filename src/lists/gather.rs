@@ -62,7 +62,7 @@ impl Candidates {
 pub fn gather(scope: &Scope<'_>, candidates: &Candidates, out: &mut Vec<u32>) -> usize {
     let first = out.len();
     let mut sharp_count = 0;
-    let spheres = &scope.scene().spheres;
+    let spheres = &scope.scene.spheres;
     let views: Vec<SphereView> = candidates.occluders.iter().map(|&j| scope.view_of(j as usize)).collect();
     // What becomes of each occluder in a light's chain.
     let chain = |light: Option<(u32, &SphereView)>, sharp, radiance: f32, results: &mut Vec<CullResult>| {
@@ -89,7 +89,7 @@ pub fn gather(scope: &Scope<'_>, candidates: &Candidates, out: &mut Vec<u32>) ->
                     out.push(ListEntry::Globe { entity, light }.pack());
                     continue;
                 }
-                if sharp && scope.scene().is_cuboid(entity as usize) {
+                if sharp && scope.scene.is_cuboid(entity as usize) {
                     out.push(ListEntry::Cuboid { entity, light }.pack());
                     continue;
                 }
@@ -128,7 +128,7 @@ pub fn gather(scope: &Scope<'_>, candidates: &Candidates, out: &mut Vec<u32>) ->
             sharp_count = out.len() - first;
         }
     }
-    if let Some(sky) = scope.scene().sky {
+    if let Some(sky) = scope.scene.sky {
         chain(None, false, sky, &mut results);
         let Some((volume, is_within)) = scope.volume() else {
             occlude(None, false, &|_| true, &results, out);
@@ -138,7 +138,7 @@ pub fn gather(scope: &Scope<'_>, candidates: &Candidates, out: &mut Vec<u32>) ->
         let of_volume = candidates.occluders.iter().zip(&mut results).filter(|(j, _)| is_within && has(**j));
         of_volume.for_each(|(_, result)| *result = CullResult::LeftOff);
         occlude(None, false, &has, &results, out);
-        out.push(ListEntry::Volume { receiver: scope.index() as u32 }.pack());
+        out.push(ListEntry::Volume { receiver: scope.index as u32 }.pack());
         occlude(None, false, &|j| !has(j), &results, out);
     }
     sharp_count

@@ -69,8 +69,8 @@ pub(crate) struct ClusterLists {
     differs: Vec<bool>,
     groups: Vec<WatchedGroup>,
     now: Option<State>,
-    /// Every cluster has changed since the last update by something that no [`State`] holds.
-    renewed: bool,
+    /// Every cluster has changed since the last update by something that no [`State`] holds, as the sky.
+    pub renewed: bool,
     stale: Vec<bool>,
 }
 
@@ -187,11 +187,6 @@ impl ClusterLists {
     /// Forgets what was merged: the next update takes every cluster.
     pub fn forget(&mut self) {
         self.now = None;
-    }
-
-    /// Marks every cluster dirty, as when the sky has changed.
-    pub fn renew(&mut self) {
-        self.renewed = true;
     }
 
     /// Brings the lists to this time and returns the clusters to merge: those that have changed, and where `sights` are
@@ -359,7 +354,7 @@ impl ClusterLists {
             candidates.sort_by_key(|j| !is_box(j));
             let of_cluster = |cluster: usize| {
                 let scope = Scope::new(scene_bounds, receiver, entity, &self.bounds[cluster], &[]);
-                let (centre, radius_m) = scope.sphere();
+                let Scope { centre, radius_m, .. } = scope;
                 let cut = if rests { Cut::default() } else { of.far.cut(centre.as_vec3(), radius_m as f32) };
                 let middle = (centre - scene_bounds.entities[receiver].centre).as_vec3();
                 let mut sighted = Sighted { middle, cut, near: Vec::new(), distant: Vec::new(), boxes: [0, 0] };

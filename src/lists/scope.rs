@@ -8,8 +8,7 @@ use crate::field::sheet::{CONTACT, Sheet};
 use crate::field::silhouette::{INSIDE, REACH, Side};
 use crate::field::sub_light::NEAR_LIGHT_STEPS;
 use crate::field::visibility_volume::SceneVolume;
-use crate::layout;
-use crate::layout::{COSINE_LOBE, EVERYTHING};
+use crate::layout::{self, COSINE_LOBE, EVERYTHING};
 use crate::lists::scene_bounds::{ClusterBounds, EntityBounds, Globe, ListLight, OutlineShape, SceneBounds};
 use crate::lists::skip::{CAP_SINES, SKIP_FADE_RAD};
 use crate::lists::tree::Crowd;
@@ -124,15 +123,17 @@ fn weight(half: Angle, cosine: f64) -> f64 {
 
 /// A cluster of a receiver, or a group of clusters, at one time.
 pub struct Scope<'m> {
-    scene: &'m SceneBounds,
-    index: usize,
+    /// What the rule looks at.
+    pub scene: &'m SceneBounds,
+    /// The receiver.
+    pub index: usize,
     /// Entities whose shadows of sharp lights are in the cluster's maps.
     near: &'m [u32],
     /// Share of light that the receiver reflects at most.
     reflectance: f64,
-    /// World, metres.
-    centre: DVec3,
-    radius_m: f64,
+    /// The sphere around its vertices in the world, metres.
+    pub centre: DVec3,
+    pub radius_m: f64,
     axis: DVec3,
     spread: Angle,
     /// Centre of the receiver's bounding sphere in the world, and how near to a sheet it touches it, metres.
@@ -169,21 +170,6 @@ impl<'m> Scope<'m> {
             spread: Angle::of_cosine(bounds.cosine.into()),
             receiver: (vector([x, y, z]), CONTACT / f64::from(inverse_radius)),
         }
-    }
-
-    /// The receiver.
-    pub fn index(&self) -> usize {
-        self.index
-    }
-
-    /// What the rule looks at.
-    pub fn scene(&self) -> &'m SceneBounds {
-        self.scene
-    }
-
-    /// The sphere around its vertices: centre in the world, radius, metres.
-    pub fn sphere(&self) -> (DVec3, f64) {
-        (self.centre, self.radius_m)
     }
 
     /// Whether the own visibility of the cluster has the shadows of an occluder, those of sharp lights or all others.

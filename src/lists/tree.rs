@@ -65,10 +65,6 @@ impl Tree {
         tree
     }
 
-    pub fn members(&self) -> &[u32] {
-        &self.members
-    }
-
     fn split(&mut self, entities: &mut [(u32, [f32; 4])], members: Range<usize>) {
         let of = &mut entities[members.clone()];
         let crowd = Crowd::around(of.iter().map(|entity| entity.1));

@@ -55,7 +55,7 @@ impl Multiplier {
     }
 
     fn count(&self) -> usize {
-        coefficient_count(self.tensor.bands())
+        coefficient_count(self.tensor.bands)
     }
 }
 

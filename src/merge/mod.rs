@@ -28,17 +28,13 @@ impl<'b> Readable<'b> {
         Ok(Readable(Bind::read(variant.reads == Reads::Texels, buffer, format)?))
     }
 
-    /// As [`Readable::new`] for what is the same in a whole workgroup, which some variants read as uniform blocks.
-    pub fn shared(buffer: &'b Buffer, variant: Variant) -> Result<Self> {
-        Self::new(buffer, variant, vk::Format::R32G32B32A32_SFLOAT)
-    }
-
     pub fn bind(&self) -> Bind<'b> {
         self.0.clone()
     }
 }
 
 pub struct MergeInputs<'b> {
+    /// The same in a whole workgroup: some variants read them as a uniform block.
     pub entities: Readable<'b>,
     pub entries: Readable<'b>,
     pub clusters: Readable<'b>,

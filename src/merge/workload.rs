@@ -138,7 +138,7 @@ impl Workload {
         let floats = vk::Format::R32G32B32A32_SFLOAT;
         Ok(MergeInputs {
             through: None,
-            entities: Readable::shared(&self.entities, variant)?,
+            entities: Readable::new(&self.entities, variant, floats)?,
             entries: Readable::new(&self.entries, variant, ENTRY_FORMAT)?,
             clusters: Readable::new(&self.clusters, variant, CLUSTER_FORMAT)?,
             fields: Readable::new(&self.fields, variant, self.permutation(variant).field_format())?,

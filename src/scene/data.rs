@@ -161,7 +161,6 @@ pub struct Output {
     pub height: u32,
     /// Stops by which radiance is brightened before it is encoded, -32 to 32. Where it is left out, the program finds
     /// it from the light of the first picture, and the library takes 0.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub exposure_ev: Option<f32>,
     /// Scene time of the first picture in seconds. The default is 0.
     #[serde(skip_serializing_if = "crate::field::is_default")]
@@ -224,10 +223,8 @@ pub struct TextureData {
     /// The name that albedos use; it is unique.
     pub name: String,
     /// A picture in PNG, JPEG, WebP or KTX2, relative to the scene file, or a glTF file that has it. The default is white.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub file: Option<PathBuf>,
     /// Which of a glTF file's images it is, counted from 0.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub image: Option<usize>,
     /// How it goes on beyond its edges along u and v: `"repeat"`, which is the default, `"mirror"` or `"clamp"`.
     #[serde(default, skip_serializing_if = "crate::field::is_default")]
@@ -236,7 +233,6 @@ pub struct TextureData {
     #[serde(default = "white", deserialize_with = "values::albedo")]
     pub factor: Vec3,
     /// Places whose alpha is less are holes, 0 to 1. By default there are none.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub alpha_cutoff: Option<f32>,
     /// Whether its alpha is the opacity of a place, in place of a cutoff. By default it is not.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
@@ -316,33 +312,27 @@ impl<'de> Deserialize<'de> for Albedo {
 
 /// A mesh, read from a file or made by a generator. In a scene that was put together in code it may be neither: then only
 /// [`super::Scene::meshes`] has it.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct MeshData {
     /// The name that entities use; it is unique.
     pub name: String,
     /// A Wavefront OBJ file or a glTF file, relative to the scene file. If there is no such file, a built-in mesh of that
     /// name is taken, such as `assets/meshes/torus.obj`. Of a glTF file all triangles are taken at rest, or one `part`.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub file: Option<PathBuf>,
     /// Mesh and primitive of a glTF file, counted from 0.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub part: Option<[usize; 2]>,
     /// One of the loose pieces of the part, counted from 0: convex solids of few triangles, and last the rest. The default
     /// takes all.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub piece: Option<u32>,
     /// Columns of a matrix that scales, mirrors or shears the part. The default leaves it as it is.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub bend: Option<[f64; 9]>,
     /// The pose of the part's skin and morph targets. The default leaves it as it is stored.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub pose: Option<PoseData>,
     /// Primitives at rest of a glTF file that are one mesh, in the file's world: place and number of each. Places are
     /// the nodes of the file's scene, those that carry before those that are carried, and each instance of a node.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub joined: Option<Vec<[usize; 2]>>,
     /// A generator, written as `plane = {...}`, `sphere = {...}` and so on.
-    #[serde(flatten, deserialize_with = "generator", skip_serializing_if = "Option::is_none")]
+    #[serde(flatten, deserialize_with = "generator")]
     pub generator: Option<Generator>,
 }
 
@@ -359,16 +349,7 @@ pub struct PoseData {
 impl MeshData {
     /// A mesh that a generator makes, or that neither a file nor a generator gives.
     pub fn new(name: impl Into<String>, generator: Option<Generator>) -> Self {
-        MeshData {
-            name: name.into(),
-            file: None,
-            part: None,
-            piece: None,
-            bend: None,
-            pose: None,
-            joined: None,
-            generator,
-        }
+        MeshData { name: name.into(), generator, ..MeshData::default() }
     }
 
     /// Refuses keys that do not go together.
@@ -410,7 +391,6 @@ fn usable_bend(bend: &[f64; 9]) -> bool {
 #[serde(deny_unknown_fields)]
 pub struct EntityData {
     /// A name for messages and tables. The default is `entity N`, counted from 0.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub name: Option<String>,
     /// The name of its mesh.
     pub mesh: String,
@@ -427,7 +407,6 @@ pub struct EntityData {
     #[serde(default = "grey")]
     pub albedo: Albedo,
     /// How it reflects besides diffusely. By default it does not.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub gloss: Option<Gloss>,
     /// Textures of a glossy surface besides its albedo.
     #[serde(default, skip_serializing_if = "crate::field::is_default")]
@@ -441,16 +420,12 @@ pub struct EntityData {
     #[serde(default, deserialize_with = "values::radiance")]
     pub emission: Vec3,
     /// Makes its light a spot along its own +y.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub spot: Option<Spot>,
     /// Whether it lights others. By default it does if it has emission.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub emits: Option<bool>,
     /// Whether it casts shadows. By default it does unless it emits.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub occludes: Option<bool>,
     /// Whether it is lit. By default it is.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub receives: Option<bool>,
     /// Movements, which are applied from first to last.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]

@@ -36,16 +36,13 @@ fn is_usual_f0(f0: &f32) -> bool {
 #[serde(deny_unknown_fields, default)]
 pub struct Maps {
     /// Green is a factor on the roughness, blue on the metallic share, as in glTF.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub gloss: Option<String>,
     /// The normal in tangent space, as in glTF: red along u, green against v, blue away from the surface.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub normal: Option<String>,
     /// Factor on the slope of those normals; 1 unless it is given.
-    #[serde(deserialize_with = "values::slope", skip_serializing_if = "Option::is_none")]
+    #[serde(deserialize_with = "values::slope")]
     pub normal_scale: Option<f32>,
     /// A factor on the emission that is seen. What the surface shines on others goes by its mesh's colours.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub glow: Option<String>,
 }
 

@@ -116,7 +116,6 @@ pub struct Keys<V> {
     #[serde(default = "Vec::new", skip_serializing_if = "Vec::is_empty")]
     pub out_slopes: Vec<V>,
     /// Seconds after which time 0 comes again.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub period_s: Option<f64>,
 }
 

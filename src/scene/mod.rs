@@ -61,7 +61,7 @@ pub struct Scene {
     /// Entities in the file's order, with their switches resolved, and then suns. [`Scene::at`] gives their placements.
     pub entities: Vec<Entity>,
     /// The surface of each entity ([`Scene::surface`]); empty where all are the meshes themselves.
-    surfaces: Vec<Arc<Mesh>>,
+    pub(crate) surfaces: Vec<Arc<Mesh>>,
     /// Entities at rest that were taken out of their group.
     loose: BTreeSet<usize>,
     /// Where the suns stand, which are the last of the entities and do not stand in the file.
@@ -283,11 +283,6 @@ impl Scene {
             let things = things.map(|(at, data)| (&*self.meshes[self.entities[at].mesh], data.at(0.0)));
             self.data.camera = framing::camera(&framing::points(things), aspect);
         }
-    }
-
-    /// Gives every entity its surface.
-    pub(crate) fn set_surfaces(&mut self, surfaces: Vec<Arc<Mesh>>) {
-        self.surfaces = surfaces;
     }
 
     /// Whether an entity has no motion and belongs to the group of all that rest.

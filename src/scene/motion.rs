@@ -78,11 +78,8 @@ impl RotationData {
 #[derive(Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Written {
-    #[serde(default, skip_serializing_if = "Option::is_none")]
     axis: Option<Vec<f32>>,
-    #[serde(default, skip_serializing_if = "Option::is_none")]
     angle_deg: Option<f64>,
-    #[serde(default, skip_serializing_if = "Option::is_none")]
     quaternion: Option<Vec<f32>>,
 }
 
@@ -196,13 +193,13 @@ pub struct Node {
     #[serde(default = "values::one", deserialize_with = "values::scale")]
     pub scale: f32,
     /// Keys of the position in metres.
-    #[serde(default, skip_serializing_if = "Option::is_none", deserialize_with = "keys::checked")]
+    #[serde(default, deserialize_with = "keys::checked")]
     pub position_keys: Option<Keys<Vec3>>,
     /// Keys of the rotation: quaternions x, y, z, w.
-    #[serde(default, skip_serializing_if = "Option::is_none", deserialize_with = "keys::checked")]
+    #[serde(default, deserialize_with = "keys::checked")]
     pub rotation_keys: Option<Keys<[f32; 4]>>,
     /// Keys of the scale.
-    #[serde(default, skip_serializing_if = "Option::is_none", deserialize_with = "keys::checked")]
+    #[serde(default, deserialize_with = "keys::checked")]
     pub scale_keys: Option<Keys<f32>>,
 }
 
@@ -267,13 +264,12 @@ pub struct Keyframe {
     #[serde(deserialize_with = "values::number")]
     pub time_s: f64,
     /// Position in metres, interpolated as [`Interpolation`] says.
-    #[serde(default, skip_serializing_if = "Option::is_none", deserialize_with = "values::maybe_position")]
+    #[serde(default, deserialize_with = "values::maybe_position")]
     pub position: Option<Vec3>,
     /// Rotation, interpolated the short way at a constant rate.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub rotation: Option<RotationData>,
     /// Scale, interpolated as [`Interpolation`] says.
-    #[serde(default, skip_serializing_if = "Option::is_none", deserialize_with = "values::maybe_scale")]
+    #[serde(default, deserialize_with = "values::maybe_scale")]
     pub scale: Option<f32>,
 }
 

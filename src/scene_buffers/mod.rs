@@ -27,8 +27,7 @@ use crate::scene::{Lights, MapIndices, Scene};
 use field_atlas::FieldAtlas;
 pub use field_atlas::FieldSlot;
 use glam::DVec3;
-use silhouettes::MeshSlots;
-pub use silhouettes::{ColorsSlot, CuboidSlot, SilhouetteSlot, Silhouettes};
+pub use silhouettes::{MeshSlots, Silhouettes, Slot};
 use std::ops::Range;
 use std::sync::Arc;
 
@@ -38,12 +37,8 @@ pub struct DeviceMesh {
     pub blocked: Option<FieldSlot>,
     /// Radiance field, if an entity needs one.
     pub radiance: Option<FieldSlot>,
-    /// Silhouette field, if an entity needs one.
-    pub silhouette: Option<SilhouetteSlot>,
-    /// The box that it is, if it is one.
-    pub cuboid: Option<CuboidSlot>,
-    /// Its colours, if it is a lamp with colours of its parts.
-    pub lamp_colors: Option<ColorsSlot>,
+    /// What sharp lights read.
+    pub slots: MeshSlots,
     /// The rectangle that blocks in place of fields, if the mesh is one.
     pub rectangle: Option<Rectangle>,
     /// Centre of the bounding sphere, metres.
@@ -159,25 +154,14 @@ impl SceneBuffers {
         let FieldAtlas { fields, slots, volume_first } =
             field_atlas::field_atlas(device, scene, &baked.meshes, volume, options)?;
         let cuboids: Vec<_> = (0..scene.meshes.len()).map(|mesh| scene.caster(mesh).cuboid()).collect();
-        let (silhouettes, outlines) = Silhouettes::new(device, &baked.meshes, &cuboids)?;
+        let (silhouettes, mesh_slots) = Silhouettes::new(device, &baked.meshes, &cuboids)?;
         let casters = (0..scene.meshes.len()).map(|mesh| scene.caster(mesh));
-        let meshes = casters.zip(slots).zip(outlines).map(
-            |((caster, [blocked, radiance]), MeshSlots { silhouette, cuboid, lamp_colors })| {
-                let (centre, radius_m) = caster.bounding_sphere();
-                let rectangle = caster.rectangle();
-                let radius_m = f64::from(radius_m);
-                DeviceMesh {
-                    blocked,
-                    radiance,
-                    silhouette,
-                    cuboid,
-                    lamp_colors,
-                    rectangle,
-                    centre_m: centre.as_dvec3(),
-                    radius_m,
-                }
-            },
-        );
+        let meshes = casters.zip(slots).zip(mesh_slots).map(|((caster, [blocked, radiance]), slots)| {
+            let (centre, radius_m) = caster.bounding_sphere();
+            let rectangle = caster.rectangle();
+            let radius_m = f64::from(radius_m);
+            DeviceMesh { blocked, radiance, slots, rectangle, centre_m: centre.as_dvec3(), radius_m }
+        });
         let meshes = meshes.collect();
         // The vertices are reserved at once. Growing by halves would hold up to three times as much.
         let quads = 2 * baked.surfaces.iter().map(|surface| surface.mesh.positions.len()).sum::<usize>();
@@ -255,8 +239,8 @@ impl SceneBuffers {
             let [blocked, radiance] = needed.fields.map(|kind| kind.is_some());
             (device_mesh.blocked.is_some() || !blocked)
                 && (device_mesh.radiance.is_some() || !radiance)
-                && (device_mesh.silhouette.is_some() || !needed.silhouette)
-                && (device_mesh.lamp_colors.is_some() || !needed.lamp_colors)
+                && (device_mesh.slots.silhouette.is_some() || !needed.silhouette)
+                && (device_mesh.slots.lamp_colors.is_some() || !needed.lamp_colors)
         })
     }
 

@@ -20,35 +20,22 @@ pub struct Silhouettes {
     pub cells: Buffer,
 }
 
-/// The silhouette field of a mesh.
-#[derive(Clone)]
-pub struct SilhouetteSlot {
-    /// Its first quad, and bit 31 where it has maps of halves.
-    pub first_quad: u32,
-    pub field: Arc<SilhouetteField>,
-}
-
-/// A mesh that is a box.
+/// Where something of a mesh lies among the nodes.
 #[derive(Clone, Copy)]
-pub struct CuboidSlot {
-    /// The first of its three quads.
+pub struct Slot<T> {
+    /// Its first quad; of a silhouette field with bit 31 where that has maps of halves.
     pub first_quad: u32,
-    pub cuboid: Cuboid,
+    pub content: T,
 }
 
-/// The colours of a mesh that is a lamp ([`crate::field::lamp_colors`]).
-#[derive(Clone)]
-pub struct ColorsSlot {
-    /// Their first quad.
-    pub first_quad: u32,
-    pub colors: Arc<LampColors>,
-}
-
-/// Where that of a mesh lies which sharp lights read.
+/// That of a mesh which sharp lights read.
 pub struct MeshSlots {
-    pub silhouette: Option<SilhouetteSlot>,
-    pub cuboid: Option<CuboidSlot>,
-    pub lamp_colors: Option<ColorsSlot>,
+    /// Silhouette field, if an entity needs one.
+    pub silhouette: Option<Slot<Arc<SilhouetteField>>>,
+    /// The box that it is, if it is one.
+    pub cuboid: Option<Slot<Cuboid>>,
+    /// Its colours, if it is a lamp with colours of its parts.
+    pub lamp_colors: Option<Slot<Arc<LampColors>>>,
 }
 
 impl Silhouettes {
@@ -70,13 +57,13 @@ impl Silhouettes {
                 first
             });
             let halves = if field.has_halves() { HAS_HALVES } else { 0 };
-            SilhouetteSlot { first_quad: first_quad | halves, field: field.clone() }
+            Slot { first_quad: first_quad | halves, content: field.clone() }
         };
         let silhouettes: Vec<_> = baked.iter().map(|mesh| mesh.silhouette.as_ref().map(&mut slot)).collect();
         let mut cuboid_slot = |cuboid: &Cuboid| {
             let first_quad = nodes.len() as u32;
             nodes.extend(cuboid.quads());
-            CuboidSlot { first_quad, cuboid: *cuboid }
+            Slot { first_quad, content: *cuboid }
         };
         let cuboids: Vec<_> = cuboids.iter().map(|cuboid| cuboid.as_ref().map(&mut cuboid_slot)).collect();
         let mut known_colors = HashMap::<*const LampColors, u32>::new();
@@ -86,7 +73,7 @@ impl Silhouettes {
                 nodes.extend(colors.quads());
                 first
             });
-            ColorsSlot { first_quad, colors: colors.clone() }
+            Slot { first_quad, content: colors.clone() }
         };
         let colors = baked.iter().map(|mesh| mesh.lamp_colors.as_ref().map(&mut colors_slot));
         let slots = silhouettes.into_iter().zip(cuboids).zip(colors);

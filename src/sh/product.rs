@@ -22,8 +22,9 @@ pub struct Entry {
 /// The non-zero entries of the product of two expansions, cut to as many bands.
 #[derive(Clone, Debug)]
 pub struct Tensor {
-    bands: usize,
-    entries: Vec<Entry>,
+    pub bands: usize,
+    /// The non-zero entries, sorted by (i, j, k).
+    pub entries: Vec<Entry>,
     /// The same entries as [`Tensor::multiply`] uses them: `a_i b_j + a_j b_i` is computed once and added to a run of
     /// targets.
     pairs: Vec<Pair>,
@@ -67,15 +68,6 @@ impl Tensor {
         }
         let (pairs, targets) = pair_up(&entries);
         Self { bands, pairs, targets, entries }
-    }
-
-    pub fn bands(&self) -> usize {
-        self.bands
-    }
-
-    /// The non-zero entries, sorted by (i, j, k).
-    pub fn entries(&self) -> &[Entry] {
-        &self.entries
     }
 
     /// Writes the product of `a` and `b` to the front of `out`; slices must hold at least their bands' coefficients.

@@ -35,7 +35,7 @@ impl Linear {
         let mut columns = Vec::new();
         let mut rows = vec![BTreeMap::new(); coefficient_count(bands)];
         let tensor = Tensor::new(bands);
-        let kept: Vec<_> = tensor.entries().iter().filter(|entry| 0 < entry.i && entry.i <= entry.j).collect();
+        let kept: Vec<_> = tensor.entries.iter().filter(|entry| 0 < entry.i && entry.i <= entry.j).collect();
         for run in kept.chunk_by(|x, y| (x.i, x.j) == (y.i, y.j)) {
             for entry in run {
                 rows[entry.k].insert(columns.len(), entry.value);

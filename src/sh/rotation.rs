@@ -48,6 +48,7 @@ pub const fn block_count(bands: usize) -> usize {
 #[derive(Clone, Debug, PartialEq)]
 pub struct Rotation {
     bands: usize,
+    /// The row-major blocks of bands 1, 2, ... in this order: [`block_count`] numbers.
     blocks: Vec<f64>,
 }
 
@@ -72,11 +73,6 @@ impl Rotation {
             }
         }
         Self { bands, blocks }
-    }
-
-    /// The row-major blocks of bands 1, 2, ... in this order: [`block_count`] numbers.
-    pub fn blocks(&self) -> &[f64] {
-        &self.blocks
     }
 
     /// Writes the coefficients of the rotated function f'(w) = f(Q^-1 w): what f shows at w, f' shows at Q w.
@@ -155,7 +151,7 @@ fn turn_about_z(program: &mut Program, bands: usize, [cosine, sine]: [Value; 2],
 
 /// Appends a constant rotation; elements that are 0 in exact arithmetic are left out.
 fn turn_fixed(program: &mut Program, rotation: &Rotation, values: &mut [Value]) {
-    let mut rest = rotation.blocks();
+    let mut rest = rotation.blocks.as_slice();
     for l in 1..rotation.bands {
         let (block, after) = rest.split_at((2 * l + 1) * (2 * l + 1));
         let band = l * l..(l + 1) * (l + 1);

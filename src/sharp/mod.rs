@@ -234,9 +234,7 @@ impl Sharp {
         cluster_count: u32,
     ) -> Result<()> {
         let SharpPermutation { reads, self_shadows, .. } = self.permutation;
-        let read = |buffer: &'r Buffer, format| -> Result<Bind<'r>> {
-            Ok(if reads == Reads::Texels { Bind::Texel(TexelView::new(buffer, format)?) } else { Bind::Buffer(buffer) })
-        };
+        let read = |buffer: &'r Buffer, format| Bind::read(reads == Reads::Texels, buffer, format);
         let quads = vk::Format::R32G32B32A32_SFLOAT;
         let resources = [
             read(inputs.entities, quads)?,

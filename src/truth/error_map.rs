@@ -23,10 +23,9 @@ pub struct ErrorPicture {
 /// Errors of the lit vertices of a frame against a reference.
 #[derive(Clone, Debug)]
 pub struct ErrorMap {
-    /// By entity, one error per vertex in units of `unit`: the mean over channels of the signed difference.
+    /// By entity, one error per vertex in units of the reference's root mean square over vertices and channels: the
+    /// mean over channels of the signed difference.
     pub errors: Vec<(usize, Vec<f64>)>,
-    /// Root mean square of the reference over vertices and channels, linear radiance.
-    pub unit: f64,
 }
 
 impl ErrorMap {
@@ -43,10 +42,10 @@ impl ErrorMap {
             assert_eq!((entity, found.len()), (other, wanted.len()), "entity and vertices");
             (*entity, found.iter().zip(wanted).map(|(f, w)| of(f, w)).collect())
         };
-        ErrorMap { errors: found.iter().zip(reference).map(entity).collect(), unit }
+        ErrorMap { errors: found.iter().zip(reference).map(entity).collect() }
     }
 
-    /// Root mean square over vertices, in units of `unit`.
+    /// Root mean square over vertices, in the unit of `errors`.
     pub fn rms(&self) -> f64 {
         let all = || self.errors.iter().flat_map(|(_, errors)| errors);
         (all().map(|e| e * e).sum::<f64>() / all().count().max(1) as f64).sqrt()
@@ -57,14 +56,13 @@ impl ErrorMap {
         ColorScale::fitting(Scheme::Signed, self.errors.iter().flat_map(|(_, errors)| errors.iter().copied()))
     }
 
-    /// A colour per vertex by entity, for [`Frame::set_radiosity`].
+    /// A colour per vertex by entity, for [`Frame::set_comparison`].
     pub fn colors(&self, scale: &ColorScale) -> Vec<EntityRadiosity> {
         self.errors.iter().map(|(entity, errors)| (*entity, errors.iter().map(|e| scale.color(*e)).collect())).collect()
     }
 
     /// Draws the errors and writes the picture with its scale bar. Entities that are not lit are grey, and emission is not
-    /// drawn. `limit` replaces the fitting limit of the scale; the title states the reference's own standard error. The
-    /// frame's radiosity is replaced until the next merge.
+    /// drawn. `limit` replaces the fitting limit of the scale; the title states the reference's own standard error.
     pub fn write(
         &self,
         path: &Path,
@@ -75,14 +73,8 @@ impl ErrorMap {
     ) -> Result<ErrorPicture> {
         let fitting = self.scale();
         let scale = ColorScale { limit: limit.unwrap_or(fitting.limit), ..fitting };
-        for entity in 0..frame.scene().entities.len() {
-            let count = frame.scene().surface(entity).positions.len();
-            frame.set_radiosity(entity, &vec![NEUTRAL; count])?;
-        }
-        for (entity, colors) in self.colors(&scale) {
-            frame.set_radiosity(entity, &colors)?;
-        }
-        frame.redraw_unlit(placements, BACKGROUND)?;
+        frame.set_comparison(0, &self.colors(&scale), NEUTRAL)?;
+        frame.draw_comparison(placements, BACKGROUND)?;
         let title = format!(
             "error of radiosity / RMS radiosity by rays from vertices; blue: too dark, red: too bright; RMS {:.4}, of the rays \
              themselves {reference_error:.4}",
@@ -113,7 +105,6 @@ mod tests {
         let found = vec![(2, vec![[3.0, 3.0, 3.0], [4.5, 4.0, 3.5], [0.0, 0.0, -3.0]])];
         let unit = (25.0_f64 / 3.0).sqrt();
         let map = ErrorMap::new(&found, &reference);
-        assert!((map.unit - unit).abs() < 1e-12);
         assert_eq!(map.errors[0].0, 2);
         let wanted = [0.0, 0.0, -1.0 / unit];
         assert!(map.errors[0].1.iter().zip(wanted).all(|(a, b)| (a - b).abs() < 1e-12), "{map:?}");

@@ -73,7 +73,7 @@ pub fn by_entity(vertices: &[Vertex], lit: &[Estimate]) -> Vec<EntityRadiosity> 
     entities.map(|run| (run[0].0.entity, run.iter().map(radiosity).collect())).collect()
 }
 
-/// T0 of a whole scene, for pictures: radiosity of every receiver's vertices by entity, as `Frame::set_radiosity` takes
+/// T0 of a whole scene, for pictures: radiosity of every receiver's vertices by entity, as `Frame::set_comparison` takes
 /// it, and the root mean square of its standard error relative to that of the radiosity.
 pub fn picture(scene: &Scene, placements: &[Placement], cast: &RayCast) -> (Vec<EntityRadiosity>, f64) {
     let world = World::of(scene, placements);

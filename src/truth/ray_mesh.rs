@@ -25,7 +25,7 @@ pub struct RayMesh {
     hierarchy: CwBvh,
     /// Triangles in the order of the hierarchy's leaves, [`ENLARGED`] as those are.
     triangles: Vec<Triangle>,
-    /// Colours of their corners, where the mesh has any.
+    /// Colours of the corners of the mesh's triangles, where it has any.
     colors: Option<Vec<[Vec3; 3]>>,
     /// Radius (in bounding radii) of a sphere around the centre that lies within a convex mesh; 0 for all other meshes.
     pub inner_radius: f32,
@@ -53,16 +53,12 @@ impl RayMesh {
         let unsorted: Vec<Triangle> =
             mesh.triangles.iter().map(|t| Triangle { v0: corner(t[0]), v1: corner(t[1]), v2: corner(t[2]) }).collect();
         let hierarchy = build_cwbvh_from_tris(&unsorted, BvhBuildParams::slow_build(), &mut Duration::default());
-        let order = hierarchy.primitive_indices.iter().map(|&i| i as usize);
-        let colors = mesh
-            .colors
-            .as_ref()
-            .map(|colors| order.clone().map(|i| mesh.triangles[i].map(|corner| colors[corner as usize])).collect());
+        let of_triangle = |colors: &Vec<Vec3>| mesh.triangles.iter().map(|t| t.map(|v| colors[v as usize])).collect();
         let inner = if mesh.is_convex() { first_shell(&Fit::ROUND, &positions, &mesh.triangles) } else { ROOMY_INNER };
         RayMesh {
-            triangles: order.map(|i| unsorted[i]).collect(),
+            triangles: hierarchy.primitive_indices.iter().map(|&i| unsorted[i as usize]).collect(),
             hierarchy,
-            colors,
+            colors: mesh.colors.as_ref().map(of_triangle),
             // `first_shell` answers with a shell off the surface where the mesh nearly fills its sphere.
             inner_radius: if inner > ROOMY_INNER { inner.min(0.93) as f32 } else { 0.0 },
             self_shadowing: bakes_transfer(mesh),
@@ -128,9 +124,7 @@ impl RayMesh {
         let Some(colors) = &self.colors else {
             return self.blocks(origin, direction, f32::INFINITY).then_some(Vec3::ONE);
         };
-        let hit = self.nearest(origin, direction)?;
-        let weights = self.weights(hit.primitive_id as usize, ENLARGED * origin + hit.t * direction);
-        let corners = &colors[hit.primitive_id as usize];
-        Some(corners.iter().zip(weights).map(|(color, weight)| *color * weight).sum())
+        let (_, triangle, weights) = self.corners_hit(origin, direction)?;
+        Some(colors[triangle].iter().zip(weights).map(|(color, weight)| *color * weight).sum())
     }
 }

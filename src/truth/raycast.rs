@@ -12,6 +12,7 @@ use crate::asset::environment::Environment;
 use crate::sh::basis::values;
 use glam::DVec3;
 use rayon::prelude::*;
+use std::sync::Arc;
 
 /// The form in which the distant light is integrated.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -82,23 +83,11 @@ impl Radiance<'_> {
 }
 
 /// Rays into a world.
+#[derive(Clone)]
 pub(super) struct Caster<'w> {
     cast: RayCast,
     world: &'w World<'w>,
-    radiance: Radiance<'w>,
-}
-
-impl Caster<'_> {
-    /// Radiosity of a point of a surface, as [`RayCast::run_at`] has it.
-    pub(super) fn point(&self, view: &VertexView, key: Vertex) -> Estimate {
-        let albedo = self.world.scene.entities[key.entity].albedo.as_dvec3();
-        self.reflected(view, &Reflection::diffuse(albedo), key)
-    }
-
-    /// Radiance that a point of a surface reflects.
-    pub(super) fn reflected(&self, view: &VertexView, surface: &Reflection, key: Vertex) -> Estimate {
-        self.cast.point(self.world, &self.radiance, (view, surface), key)
-    }
+    radiance: Arc<Radiance<'w>>,
 }
 
 impl RayCast {
@@ -123,16 +112,20 @@ impl RayCast {
             Distant::Exact => Radiance::Exact(environment),
             Distant::Bands(bands) => Radiance::Bands(bands, Box::new(environment.coefficients(bands))),
         };
-        Caster { cast: *self, world, radiance }
+        Caster { cast: *self, world, radiance: Arc::new(radiance) }
+    }
+}
+
+impl Caster<'_> {
+    /// Radiosity of a point of a surface, as [`RayCast::run_at`] has it.
+    pub(super) fn point(&self, view: &VertexView, key: Vertex) -> Estimate {
+        let albedo = self.world.scene.entities[key.entity].albedo.as_dvec3();
+        self.reflected(view, &Reflection::diffuse(albedo), key)
     }
 
-    fn point(
-        &self,
-        world: &World<'_>,
-        radiance: &Radiance<'_>,
-        (view, surface): (&VertexView, &Reflection),
-        vertex: Vertex,
-    ) -> Estimate {
+    /// Radiance that a point of a surface reflects.
+    pub(super) fn reflected(&self, view: &VertexView, surface: &Reflection, key: Vertex) -> Estimate {
+        let Caster { cast, world, .. } = self;
         let mut occluders = world.occluders(view);
         occluders.retain(|occluder| occluder.rises_above(view.normal));
         // Near occluders come first, because they are the most likely to block a ray.
@@ -146,56 +139,47 @@ impl RayCast {
 
         let mut sum = DVec3::ZERO;
         let mut squares = DVec3::ZERO;
-        for run in 0..self.runs {
+        for run in 0..cast.runs {
             let sequence = |stream: usize| {
-                Sequence::new(
-                    self.seed,
-                    [u64::from(run), vertex.entity as u64, (vertex.index as u64) << 16 | stream as u64],
-                )
+                let keys = [u64::from(run), key.entity as u64, (key.index as u64) << 16 | stream as u64];
+                Sequence::new(cast.seed, keys)
             };
-            let at = |stream: usize| Point { world, view, surface, points: sequence(stream) };
-            let mut found = self.sky(&at(0), &occluders, radiance);
+            let at = |stream: usize| Point { view, surface, points: sequence(stream) };
+            let mut found = self.sky(&at(0), &occluders);
             for (stream, light) in lights.iter().enumerate() {
                 found += self.light(&at(1 + stream), light);
             }
-            if self.bounces > 0 {
-                found += self.bounced(&at(lights.len() + 1), radiance);
+            if cast.bounces > 0 {
+                found += self.bounced(&at(lights.len() + 1));
             }
             sum += found;
             squares += found * found;
         }
-        let runs = f64::from(self.runs);
+        let runs = f64::from(cast.runs);
         let mean = sum / runs;
         let variance = (squares / runs - mean * mean).max(DVec3::ZERO) / (runs - 1.0).max(1.0);
         Estimate { radiosity: mean.to_array(), error: variance.to_array().map(f64::sqrt) }
     }
 
     fn rays_a_run(&self) -> u32 {
-        self.rays / self.runs
+        self.cast.rays / self.cast.runs
     }
 
     /// Reflected light of the distant light.
-    fn sky(&self, at: &Point<'_>, occluders: &[EntityView], radiance: &Radiance<'_>) -> DVec3 {
-        if matches!(radiance, Radiance::None) {
+    fn sky(&self, at: &Point<'_>, occluders: &[EntityView]) -> DVec3 {
+        if matches!(*self.radiance, Radiance::None) {
             return DVec3::ZERO;
         }
-        let Point { world, view, surface, points } = at;
         let arrives = |direction: DVec3| {
-            let blocked = occluders.iter().any(|occluder| world.blocks(occluder, direction, f64::INFINITY))
-                || world.blocks_itself(view, direction, f64::INFINITY);
-            if blocked { DVec3::ZERO } else { radiance.at(direction) }
+            let blocked = occluders.iter().any(|occluder| self.world.blocks(occluder, direction, f64::INFINITY))
+                || self.world.blocks_itself(at.view, direction, f64::INFINITY);
+            if blocked { DVec3::ZERO } else { self.radiance.at(direction) }
         };
-        self.gather(view, surface, points, &arrives)
+        self.gather(at, &arrives)
     }
 
     /// What a surface reflects of the light that arrives from each direction.
-    fn gather(
-        &self,
-        view: &VertexView,
-        surface: &Reflection,
-        points: &Sequence,
-        arrives: &dyn Fn(DVec3) -> DVec3,
-    ) -> DVec3 {
+    fn gather(&self, Point { view, surface, points }: &Point<'_>, arrives: &dyn Fn(DVec3) -> DVec3) -> DVec3 {
         let axes = Axes::new(view.normal);
         let mut diffuse = DVec3::ZERO;
         let mut glossy = DVec3::ZERO;
@@ -218,7 +202,8 @@ impl RayCast {
     /// the light and half from the lobe, weighed by the sum of both densities (Veach, *Robust Monte Carlo Methods*,
     /// 1997, section 9.2.2).
     fn light(&self, at: &Point<'_>, shadowed: &Shadowed) -> DVec3 {
-        let Point { world, view, surface, points } = at;
+        let Point { view, surface, points } = at;
+        let world = self.world;
         let light = &shadowed.light;
         let cone = light.cone();
         let density = 1.0 / cone_solid_angle(cone.height);
@@ -250,31 +235,26 @@ impl RayCast {
     }
 
     /// Reflected light that comes from other surfaces.
-    fn bounced(&self, at: &Point<'_>, radiance: &Radiance<'_>) -> DVec3 {
-        let Point { world, view, surface, points } = at;
+    fn bounced(&self, at: &Point<'_>) -> DVec3 {
+        let cast = RayCast { rays: 1, runs: 1, bounces: 0, seed: at.points.seed(), ..self.cast };
+        let one = Caster { cast, ..self.clone() };
         let next = std::cell::Cell::new(0);
         let arrives = |direction: DVec3| {
             next.set(next.get() + 1);
-            self.along(world, radiance, view, direction, &Walk { points, path: next.get() })
+            self.along(at, direction, next.get(), &one)
         };
-        self.gather(view, surface, points, &arrives)
+        self.gather(at, &arrives)
     }
 
-    /// Radiance without emission along a path that starts at a point.
-    fn along(
-        &self,
-        world: &World<'_>,
-        radiance: &Radiance<'_>,
-        from: &VertexView,
-        toward: DVec3,
-        walk: &Walk<'_>,
-    ) -> DVec3 {
-        let one = RayCast { rays: 1, runs: 1, bounces: 0, ..*self };
-        let mut view = *from;
+    /// Radiance without emission along the path of that number from a point; `one` casts a ray from each surface that it
+    /// meets.
+    fn along(&self, at: &Point<'_>, toward: DVec3, path: u32, one: &Caster<'_>) -> DVec3 {
+        let Caster { cast, world, .. } = self;
+        let mut view = *at.view;
         let mut direction = toward;
         let mut weight = DVec3::ONE;
         let mut sum = DVec3::ZERO;
-        for bounce in 0..self.bounces {
+        for bounce in 0..cast.bounces {
             let Some((entity, hit)) = world.first_surface(&view, direction) else { break };
             view = world.surface(entity, hit.place, hit.normal);
             let of = &world.scene.entities[entity];
@@ -283,20 +263,18 @@ impl RayCast {
                 break;
             }
             let base = of.albedo.as_dvec3() * hit.over_mean;
-            let key = Vertex { entity, index: (walk.path * self.bounces + bounce) as usize };
-            let surface = Reflection::diffuse(base);
-            let step = RayCast { seed: walk.points.seed(), ..one };
-            sum += weight * DVec3::from(step.point(world, radiance, (&view, &surface), key).radiosity);
+            let key = Vertex { entity, index: (path * cast.bounces + bounce) as usize };
+            sum += weight * DVec3::from(one.reflected(&view, &Reflection::diffuse(base), key).radiosity);
             weight *= base;
             if bounce >= SURE_BOUNCES {
                 // Russian roulette.
                 let stays = weight.max_element().min(1.0);
-                if walk.points.other(self.bounces + bounce).point(walk.path).x >= stays {
+                if at.points.other(cast.bounces + bounce).point(path).x >= stays {
                     break;
                 }
                 weight /= stays;
             }
-            direction = Axes::new(view.normal).cosine(walk.points.other(bounce).point(walk.path));
+            direction = Axes::new(view.normal).cosine(at.points.other(bounce).point(path));
         }
         sum
     }
@@ -304,7 +282,6 @@ impl RayCast {
 
 /// A point of a surface on which light falls, and the points of the unit square that its rays are of.
 struct Point<'p> {
-    world: &'p World<'p>,
     view: &'p VertexView,
     surface: &'p Reflection,
     points: Sequence,
@@ -312,12 +289,6 @@ struct Point<'p> {
 
 /// After so many bounces a path may end by chance.
 const SURE_BOUNCES: u32 = 2;
-
-/// A path from surface to surface.
-struct Walk<'p> {
-    points: &'p Sequence,
-    path: u32,
-}
 
 /// Distances along a ray that differ by less than this share are equal: rays are cast in f32, each in units of its
 /// mesh. Where two surfaces coincide, the light's counts as the nearer one.
@@ -344,7 +315,7 @@ impl Shadowed {
         for occluder in occluders.iter().filter(nearer) {
             if occluder.range_m()[1] <= near { &mut before } else { &mut beside }.push(*occluder);
         }
-        let limits_itself = view.own().is_some_and(|own| own.range_m()[1] > near);
+        let limits_itself = view.own.is_some_and(|own| own.range_m()[1] > near);
         Shadowed { light, before, beside, limits_itself }
     }
 

@@ -40,7 +40,7 @@ pub struct VertexView {
     pub position: DVec3,
     pub normal: DVec3,
     /// Its own entity as seen from just off its surface; `None` if it cannot shadow itself.
-    own: Option<EntityView>,
+    pub own: Option<EntityView>,
     entity: usize,
 }
 
@@ -241,7 +241,7 @@ impl<'s> World<'s> {
     pub fn first_surface(&self, view: &VertexView, direction: DVec3) -> Option<(usize, SurfaceHit)> {
         let others = self.occluders(view);
         let (panes, others): (Vec<_>, Vec<_>) =
-            others.iter().chain(view.own()).partition(|sight| self.scene.entities[sight.entity].transparent);
+            others.iter().chain(&view.own).partition(|sight| self.scene.entities[sight.entity].transparent);
         let met = others.into_iter().filter_map(|sight| Some((sight, self.first_hit_m(sight, direction)?)));
         let (sight, limit_m) = met.min_by(|a, b| a.1.total_cmp(&b.1))?;
         let lamps = self.lights(view);
@@ -296,13 +296,6 @@ pub struct SurfaceHit {
     pub tilted: DVec3,
     /// Share of light that it keeps back.
     pub opacity: f64,
-}
-
-impl VertexView {
-    /// The receiver itself as seen from just off its surface, where it can shadow itself.
-    pub fn own(&self) -> Option<&EntityView> {
-        self.own.as_ref()
-    }
 }
 
 impl EntityView {

@@ -4,7 +4,7 @@
 /// its size.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Command {
-    /// Sets the picture's width and height; sides of 0 (a minimised window) are ignored.
+    /// Sets the window's width and height; sides of 0 (a minimised window) are ignored.
     Resize([u32; 2]),
     /// Turns the camera around its target by a drag in pixels.
     Orbit([f32; 2]),

@@ -31,7 +31,7 @@ pub(super) enum EditKind {
 #[derive(Default)]
 pub(super) struct History {
     /// The scene before each change.
-    done: Vec<Data>,
+    pub done: Vec<Data>,
     undone: Vec<Data>,
     /// Kind and selection of the last change, while further changes of this kind may join it.
     open: Option<(EditKind, Option<usize>)>,
@@ -65,10 +65,6 @@ impl History {
         let there = from.pop()?;
         to.push(now.clone());
         Some(there)
-    }
-
-    pub fn undo_count(&self) -> usize {
-        self.done.len()
     }
 }
 
@@ -147,7 +143,7 @@ impl Editor {
     }
 
     fn set_exposure(&mut self, ev: f32) -> Effect {
-        if !(-32.0..=32.0).contains(&ev) || ev == self.exposure_ev() {
+        if !(-32.0..=32.0).contains(&ev) || ev == self.scene.data.output.exposure_ev() {
             return Effect::default();
         }
         self.history.note(EditKind::Exposure, None, true, &self.scene.data);

@@ -17,7 +17,8 @@ pub struct Editor {
     pub(super) scene: Scene,
     path: PathBuf,
     pub(super) orbit: OrbitCamera,
-    size: [u32; 2],
+    /// Width and height of the window, pixels.
+    window: [u32; 2],
     /// The selected entity; `None` if none is selected.
     pub selection: Option<usize>,
     pub time_s: f64,
@@ -60,7 +61,7 @@ impl Editor {
         scene.data.output.exposure_ev.get_or_insert(0.0);
         Editor {
             orbit: OrbitCamera::new(&scene.data.camera),
-            size: [scene.data.output.width, scene.data.output.height],
+            window: [scene.data.output.width, scene.data.output.height],
             selection: None,
             time_s: scene.data.output.time_s,
             running: true,
@@ -96,8 +97,19 @@ impl Editor {
         self.scene.at(self.time_s)
     }
 
+    /// Width and height of the window, pixels: those of the saved picture.
+    pub fn window(&self) -> [u32; 2] {
+        self.window
+    }
+
+    /// Those of the merged picture.
     pub fn size(&self) -> [u32; 2] {
-        self.size
+        self.size_in(self.window)
+    }
+
+    /// The same in a window of another size: its left half beside a reference.
+    pub(super) fn size_in(&self, [width, height]: [u32; 2]) -> [u32; 2] {
+        [if self.reference { (width / 2).max(1) } else { width }, height]
     }
 
     /// Radiance that the exposure shows as white.
@@ -105,21 +117,8 @@ impl Editor {
         self.scene.data.output.white()
     }
 
-    pub fn exposure_ev(&self) -> f32 {
-        self.scene.data.output.exposure_ev()
-    }
-
-    pub fn sky(&self) -> f32 {
-        self.scene.data.environment.strength
-    }
-
-    /// Angle of the distant light, degrees, -180 to 180.
-    pub fn sky_turn_deg(&self) -> f32 {
-        self.scene.data.environment.turn_deg
-    }
-
     pub fn undo_count(&self) -> usize {
-        self.history.undo_count()
+        self.history.done.len()
     }
 
     /// Advances the time by `dt_s` seconds if the motion runs. Placements depend only on the sum of all `dt_s`.
@@ -135,9 +134,9 @@ impl Editor {
     pub fn apply(&mut self, command: Command) -> Effect {
         let unchanged = Changed::default();
         match command {
-            Command::Resize(size) if size.contains(&0) || size == self.size => Effect::default(),
+            Command::Resize(size) if size.contains(&0) || size == self.window => Effect::default(),
             Command::Resize(size) => {
-                self.size = size;
+                self.window = size;
                 Changed { camera: true, ..unchanged }.into()
             }
             Command::Orbit(drag) => self.see(|orbit, [_, height], _| orbit.turn(drag, height)),
@@ -164,7 +163,10 @@ impl Editor {
             Command::DragEnd => self.let_go(),
             Command::NextScene => self.next_scene(),
             Command::ToggleRunning => toggle(&mut self.running),
-            Command::ToggleReference => toggle(&mut self.reference),
+            Command::ToggleReference => {
+                self.reference = !self.reference;
+                Changed { display: true, camera: true, ..unchanged }.into()
+            }
             Command::ToggleError => toggle(&mut self.error),
             Command::ToggleOverlay => toggle(&mut self.overlay),
             Command::ToggleKeys => {
@@ -206,7 +208,7 @@ impl Editor {
     }
 
     fn see(&mut self, change: impl FnOnce(&mut OrbitCamera, [u32; 2], (DVec3, f64))) -> Effect {
-        let size = self.size;
+        let size = self.size();
         let bounds = self.bounds();
         let before = self.orbit;
         change(&mut self.orbit, size, bounds);
@@ -241,7 +243,7 @@ impl Editor {
     /// Replaces the scene and keeps the window's state.
     pub(super) fn replace(&mut self, next: Editor) {
         *self = Editor {
-            size: self.size,
+            window: self.window,
             running: self.running,
             reference: self.reference,
             error: self.error,

@@ -6,7 +6,7 @@ use super::panel::{LEAST_TEXT, Status, grouped};
 use crate::bench::figures::quantiles;
 use crate::check::PASSES;
 use crate::gpu::Timing;
-use crate::scene::light;
+use crate::scene::{Data, light};
 use egui::{Align2, Color32, FontId, Pos2, Rect, RichText, Sense, Stroke, Ui, pos2, vec2};
 use std::collections::VecDeque;
 
@@ -93,12 +93,13 @@ fn sliders(ui: &mut Ui, editor: &Editor, commands: &mut Vec<Command>) {
             commands.push(Command::EndSlide);
         }
     };
-    slide(ui, "exposure", editor.exposure_ev(), -8.0..=8.0, " EV", Command::SetExposure);
+    let Data { output, environment, .. } = &editor.scene().data;
+    slide(ui, "exposure", output.exposure_ev(), -8.0..=8.0, " EV", Command::SetExposure);
     if let Some(ev) = editor.light_ev() {
         slide(ui, "light", ev, -4.0..=24.0, " EV", Command::SetLight);
     }
-    slide(ui, "sky", editor.sky(), 0.0..=4.0, "", Command::SetSky);
-    slide(ui, "sky turned", editor.sky_turn_deg(), -180.0..=180.0, "°", Command::SetSkyTurn);
+    slide(ui, "sky", environment.strength, 0.0..=4.0, "", Command::SetSky);
+    slide(ui, "sky turned", environment.turn_deg, -180.0..=180.0, "°", Command::SetSkyTurn);
 }
 
 /// Draws stacked times of the passes in milliseconds, the newest at the right.

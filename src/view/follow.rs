@@ -156,7 +156,7 @@ impl Viewer {
             return Ok(());
         }
         self.previewed = if is_lit { Previewed::Light } else { Previewed::Shapes };
-        let options = frame::Options { size: self.size, ..self.setup.frame };
+        let options = frame::Options { size: self.size(), ..self.setup.frame };
         let make = if is_lit { lit } else { shapes };
         let preview = make(&self.baker, &self.setup.cache, &self.editor, options);
         self.settle()?;
@@ -177,7 +177,7 @@ impl Viewer {
     /// A frame of the scene, whose fields are cached.
     fn new_frame(&mut self) -> Result<Frame> {
         self.settle()?;
-        let options = frame::Options { size: self.size, ..self.setup.frame };
+        let options = frame::Options { size: self.size(), ..self.setup.frame };
         Frame::new(&self.baker, &self.setup.cache, self.editor.scene(), options, &|_, _, _| ())
     }
 
@@ -307,10 +307,6 @@ fn lit(baker: &Baker, cache: &Cache, editor: &Editor, options: frame::Options) -
 
 /// The viewport of a frame without shadows.
 pub(super) fn unlit_viewport([width, height]: [u32; 2]) -> Viewport {
-    Viewport {
-        radiosity: RadiositySource::Comparison(0),
-        adds_emission: false,
-        by_vertex: true,
-        ..Viewport::merged([0, 0, width, height])
-    }
+    let radiosity = RadiositySource::Comparison(0);
+    Viewport { radiosity, adds_emission: false, ..Viewport::merged([0, 0, width, height]) }
 }

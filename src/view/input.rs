@@ -50,13 +50,7 @@ pub struct KeyHelp {
     pub keys: &'static str,
     pub what: &'static str,
     /// Each key, whether with Ctrl, and its command. Empty for lines about the pointer.
-    bindings: &'static [(Key, bool, Command)],
-}
-
-impl KeyHelp {
-    pub fn commands(&self) -> Vec<Command> {
-        self.bindings.iter().map(|(.., command)| *command).collect()
-    }
+    pub bindings: &'static [(Key, bool, Command)],
 }
 
 const fn letter(key: char, command: Command) -> (Key, bool, Command) {

@@ -152,7 +152,7 @@ impl Viewer {
                 Previewed::Shapes | Previewed::Nothing => unlit_viewport([width, height]),
             }];
         }
-        let [own_width, _] = self.own_size_of([width, height]);
+        let [own_width, _] = self.editor.size_in([width, height]);
         let mut own = Viewport::merged([0, 0, own_width, height]);
         if self.editor.error && self.error_shown.is_some() {
             own = Viewport { radiosity: RadiositySource::Comparison(ERROR), adds_emission: false, ..own };
@@ -171,7 +171,7 @@ impl Viewer {
         let Some(frame) = &mut self.frame else { return Err(Error::Failed("no picture has been drawn yet".into())) };
         let [width, height] = frame.size();
         let placements = self.editor.placements();
-        let ev = self.editor.exposure_ev();
+        let ev = self.editor.scene().data.output.exposure_ev();
         let white = self.editor.white();
         let png = free_name(&self.editor.save_path());
         let exr = png.with_extension("exr");

@@ -68,7 +68,7 @@ impl Editor {
     /// it are relative to `folder`; files of built-in scenes keep their built-in names.
     pub fn data(&self, folder: &Path) -> Data {
         let mut data = self.scene().data.clone();
-        [data.output.width, data.output.height] = self.size();
+        [data.output.width, data.output.height] = self.window();
         data.output.time_s = self.time_s;
         let from = self.path().parent().unwrap_or(Path::new(""));
         data.move_files(from, folder);

@@ -83,16 +83,18 @@ pub(super) enum Leave {
 /// An editor with everything that is needed to show it.
 pub struct Viewer {
     pub(super) setup: Setup,
-    pub(super) editor: Editor,
+    pub editor: Editor,
     pub(super) input: Input,
     pub(super) baker: Baker,
-    pub(super) frame: Option<Frame>,
+    /// The frame, once its fields are baked.
+    pub frame: Option<Frame>,
     /// The scene without shadows, or lit on coarse surfaces, while the first bake takes longer than a moment.
     pub(super) preview: Option<Frame>,
-    pub(super) previewed: Previewed,
+    /// What is shown in place of the frame until its fields are baked.
+    pub previewed: Previewed,
     pub(super) show: Show,
     pub(super) overlay: Overlay,
-    pub(super) egui: egui::Context,
+    pub egui: egui::Context,
     pub(super) paint: Paint,
     pub(super) flights: VecDeque<Flight>,
     /// Changes that no frame shows yet.
@@ -108,15 +110,15 @@ pub struct Viewer {
     /// Counts every change of the light on vertices.
     pub(super) version: u64,
     pub(super) watch: Option<Watch>,
-    pub(super) shader_error: Option<String>,
+    /// The compiler's messages about the last change of a shader file.
+    pub shader_error: Option<String>,
     pub(super) messages: VecDeque<Message>,
     pub(super) timings: VecDeque<Vec<Timing>>,
     pub(super) edges: HashMap<usize, Edges>,
-    pub(super) quit: bool,
+    /// Whether the window is to close.
+    pub quit: bool,
     /// Of which way to leave the scene it was said that it loses edits, since the last edit.
     pub(super) asked_to_leave: Option<Leave>,
-    /// Width and height of the window's picture, pixels.
-    pub(super) size: [u32; 2],
     /// Time at which the picture is refined, unless anything moves before.
     pub(super) refine_at: Option<Instant>,
     pub(super) pace: Pace,
@@ -125,7 +127,8 @@ pub struct Viewer {
     /// The progress that was shown last.
     pub(super) told: [Option<TaskProgress>; 2],
     pub(super) frame_count: u64,
-    pub(super) build_count: u64,
+    /// Scenes prepared for drawing so far, the same one anew where lights became occluders.
+    pub build_count: u64,
     /// Frames that were drawn before the last build, until what that freed is given back.
     pub(super) drawn_before: Option<u64>,
 }
@@ -162,7 +165,6 @@ impl Viewer {
             edges: HashMap::new(),
             quit: false,
             asked_to_leave: None,
-            size: editor.size(),
             refine_at: None,
             pace: Pace::default(),
             repaint_at: Some(Instant::now()),
@@ -178,42 +180,18 @@ impl Viewer {
         Ok(viewer)
     }
 
-    pub fn editor(&self) -> &Editor {
-        &self.editor
-    }
-
     pub fn rescued(&mut self, error: Error) -> Error {
-        // The saved picture has the size of the window.
-        self.editor.apply(Command::Resize(self.size));
         self.editor.rescued(error)
     }
 
     /// Width and height of the window's picture, pixels.
     pub fn size(&self) -> [u32; 2] {
-        self.size
-    }
-
-    /// The frame, once its fields are baked.
-    pub fn frame(&self) -> Option<&Frame> {
-        self.frame.as_ref()
-    }
-
-    pub fn egui(&self) -> &egui::Context {
-        &self.egui
-    }
-
-    pub fn wants_to_quit(&self) -> bool {
-        self.quit
+        self.editor.window()
     }
 
     /// Whether the pointer drags the scene or an entity.
     pub fn is_dragging(&self) -> bool {
         self.input.is_dragging()
-    }
-
-    /// What is shown in place of the frame until its fields are baked.
-    pub fn previewed(&self) -> Previewed {
-        self.previewed
     }
 
     /// Whether a background bake is running, or may have to.
@@ -234,16 +212,6 @@ impl Viewer {
     /// Whether the error's colours are up to date.
     pub fn shows_error_colors(&self) -> bool {
         self.editor.error && self.error_shown.as_ref().is_some_and(|(version, ..)| *version == self.version)
-    }
-
-    /// The compiler's messages about the last change of a shader file.
-    pub fn shader_error(&self) -> Option<&str> {
-        self.shader_error.as_deref()
-    }
-
-    /// Scenes prepared for drawing so far, the same one anew where lights became occluders.
-    pub fn build_count(&self) -> u64 {
-        self.build_count
     }
 
     pub fn wants_frame(&self) -> bool {
@@ -278,14 +246,6 @@ impl Viewer {
             }
             _ => log::info!("frame {}: command {command:?}", self.frame_count),
         }
-        // The editor's picture is the viewport that shows the merged scene.
-        let command = match command {
-            Command::Resize(size) => {
-                self.size = if size.contains(&0) { self.size } else { size };
-                Command::Resize(self.own_size())
-            }
-            other => other,
-        };
         match command {
             Command::NextScene if !self.may_leave(Leave::ForNext) => return Ok(()),
             Command::Quit => self.quit = self.may_leave(Leave::ForGood),
@@ -297,23 +257,17 @@ impl Viewer {
             }
             _ => {}
         }
-        let Effect { mut changed, message } = self.editor.apply(command);
+        let Effect { changed, message } = self.editor.apply(command);
         if changed.light() || changed.exposure {
             self.asked_to_leave = None;
-        }
-        if command == Command::ToggleReference {
-            changed |= self.editor.apply(Command::Resize(self.own_size())).changed;
         }
         self.say(message);
         self.follow(changed)
     }
 
-    /// Saves the scene with the window's size, whatever part of the window shows it.
     fn save(&mut self) {
         let path = self.editor.save_path();
-        self.editor.apply(Command::Resize(self.size));
         let outcome = self.editor.save(&path).map(|()| format!("wrote {}", path.display()));
-        self.editor.apply(Command::Resize(self.own_size()));
         self.say(Some(outcome.unwrap_or_else(|error| error.to_string())));
     }
 
@@ -321,10 +275,11 @@ impl Viewer {
     pub fn update(&mut self, dt_s: f64) -> Result<()> {
         self.catch_up()?;
         self.give_back();
-        let forgot = self.forget_messages();
+        let message_count = self.messages.len();
+        self.messages.retain(|message| message.since.elapsed() < SHOWN);
         let progress =
             [self.bake.as_ref().map(BackgroundTask::progress), self.rays.as_ref().map(BackgroundTask::progress)];
-        if forgot || progress != self.told {
+        if message_count != self.messages.len() || progress != self.told {
             self.told = progress;
             self.pending.display = true;
         }
@@ -345,16 +300,6 @@ impl Viewer {
             self.reload(&files);
         }
         self.look_at_rays()
-    }
-
-    /// Size of the viewport that shows the merged picture: the window's left half beside a reference.
-    fn own_size(&self) -> [u32; 2] {
-        self.own_size_of(self.size)
-    }
-
-    /// The same in a window of another size.
-    pub(super) fn own_size_of(&self, [width, height]: [u32; 2]) -> [u32; 2] {
-        [if self.editor.reference { (width / 2).max(1) } else { width }, height]
     }
 
     /// Shows another scene in place of this one: a scene file, a glTF file or an OBJ file, such as one that was dropped
@@ -387,7 +332,7 @@ impl Viewer {
             return Err(Error::input(path, format!("--strict: {}", left_out.join("; "))));
         }
         add_sky(&mut scene);
-        let [width, height] = self.size.map(f64::from);
+        let [width, height] = self.size().map(f64::from);
         scene.fit_added_camera(width / height);
         let time_s = scene.data.output.time_s;
         let exposed = exposure::settle(&mut scene, time_s, width / height);
@@ -434,7 +379,7 @@ impl Viewer {
         Status {
             device: &info.name,
             driver: &info.driver,
-            size: self.size,
+            size: self.size(),
             refined: self.setup.refines.then(|| self.is_refined()),
             timings: &self.timings,
             vertices: self.frame.as_ref().map(Frame::receiver_vertex_count),
@@ -473,13 +418,6 @@ impl Viewer {
         log::info!("message: {text}");
         self.messages.push_back(Message { since: Instant::now(), text, insists });
         self.pending |= Changed { display: true, ..Changed::default() };
-    }
-
-    /// Forgets messages that were shown long enough. Returns whether there were any.
-    pub(super) fn forget_messages(&mut self) -> bool {
-        let count = self.messages.len();
-        self.messages.retain(|message| message.since.elapsed() < SHOWN);
-        count != self.messages.len()
     }
 
     /// Returns `Device` and `Unsupported` errors; all other errors become messages.

@@ -59,7 +59,7 @@ pub fn run(folder: &Path) -> Result<()> {
         viewer.draw(FrameTarget::Image(&image))?;
     }
     viewer.settle()?;
-    if viewer.frame().is_none() {
+    if viewer.frame.is_none() {
         return Err(Error::Failed(viewer.message().unwrap_or("no frame, and nothing is said of it").to_owned()));
     }
     let pixels: Vec<[u8; 4]> = image.download()?;

@@ -35,7 +35,8 @@ pub fn fields() -> Vec<Vec<u8>> {
 
 /// What [`file::read`] says to a file of such content, without the file, which would take twice as long.
 fn stored_file<H: DeserializeOwned>(bytes: &[u8], magic: [u8; 8]) -> Result<(H, Vec<u8>)> {
-    file::parse(&framed(bytes, magic), Path::new(NAME), magic)
+    let bytes = framed(bytes, magic);
+    file::read_from(&*bytes, bytes.len() as u64, Path::new(NAME), magic)
 }
 
 pub fn field(bytes: &[u8]) -> Result<()> {

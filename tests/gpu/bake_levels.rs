@@ -71,8 +71,8 @@ fn outlines_are_those_of_the_whole_mesh() {
     let (found, wanted) = (bake(true), bake(false));
     assert!(found.header.level_pixels > 0.0 && wanted.header.level_pixels == 0.0);
     let steps = |(a, b): (&u8, &u8)| (i32::from(a.cast_signed()) - i32::from(b.cast_signed())).abs();
-    let all = found.payload().len();
-    let differing = found.payload().iter().zip(wanted.payload()).filter(|pair| steps(*pair) > 4).count();
+    let all = found.payload.len();
+    let differing = found.payload.iter().zip(&wanted.payload).filter(|pair| steps(*pair) > 4).count();
     assert!(100 * differing < all, "{differing} of {all}");
 }
 

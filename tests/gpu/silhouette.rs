@@ -145,9 +145,9 @@ fn receivers_and_lights_within_the_bounding_sphere_see_what_lies_between_them() 
     ] {
         let field = bake(&gpu, &mesh, SilhouetteOptions::default());
         assert!(
-            field.has_halves() != mesh.is_convex() && field.payload().len() <= 600 * 1024,
+            field.has_halves() != mesh.is_convex() && field.payload.len() <= 600 * 1024,
             "{} bytes",
-            field.payload().len()
+            field.payload.len()
         );
         let shape = RayMesh::new(&mesh);
         for (inside, limit) in ["receivers", "lights"].into_iter().zip(limits) {
@@ -206,16 +206,16 @@ fn a_file_keeps_everything_and_its_header_is_not_believed() {
     let path = folder.path().join("pot.sf");
     field.write(&path).unwrap();
     let read = SilhouetteField::read(&path).unwrap();
-    assert_eq!((&read.header, read.payload()), (&field.header, field.payload()));
-    assert_eq!(read.frames(), field.frames());
+    assert_eq!((&read.header, &read.payload), (&field.header, &field.payload));
+    assert_eq!(read.frames, field.frames);
     let mut header = field.header.clone();
     header.cells = 3;
-    assert!(SilhouetteField::new(header.clone(), field.payload().to_vec()).is_err(), "maps are missing");
+    assert!(SilhouetteField::new(header.clone(), field.payload.clone()).is_err(), "maps are missing");
     header.cells = u32::MAX;
-    assert!(SilhouetteField::new(header, field.payload().to_vec()).is_err(), "cells are out of range");
+    assert!(SilhouetteField::new(header, field.payload.clone()).is_err(), "cells are out of range");
     // Twice as many are 2 within 32 bits.
     let header = SilhouetteHeader { half_px: (1 << 31) + 1, ..field.header.clone() };
-    assert!(SilhouetteField::new(header, field.payload().to_vec()).is_err(), "halves are out of range");
+    assert!(SilhouetteField::new(header, field.payload.clone()).is_err(), "halves are out of range");
 }
 
 /// What is stored lies as near as a byte can to the number.

@@ -114,5 +114,5 @@ fn switches_are_said_to_have_changed() {
     }
     assert_eq!(flags(&editor), before.map(|flag| !flag));
     assert!(!editor.apply(Command::Resize([0, 0])).changed.any(), "a minimised window has no picture");
-    assert_eq!(editor.size(), [200, 100]);
+    assert_eq!((editor.window(), editor.size()), ([200, 100], [100, 100]), "beside a reference");
 }

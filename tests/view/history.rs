@@ -32,7 +32,9 @@ fn any_command() -> impl Strategy<Value = Command> {
         number().prop_map(Command::SetLight),
         number().prop_map(Command::SetExposure),
         [0_u32..2000, 0_u32..2000].prop_map(Command::Resize),
-        proptest::sample::select(CONTROLS.iter().flat_map(|row| row.commands()).collect::<Vec<_>>()),
+        proptest::sample::select(
+            CONTROLS.iter().flat_map(|row| row.bindings).map(|(.., command)| *command).collect::<Vec<_>>(),
+        ),
         proptest::sample::select(vec![Command::DragEnd, Command::EndSlide]),
     ]
 }
@@ -73,7 +75,7 @@ proptest! {
         prop_assert_eq!(&editor.scene().data.entities, &start.data.entities);
         prop_assert_eq!(&editor.scene().entities, &start.entities);
         prop_assert_eq!(&editor.scene().data.environment, &start.data.environment);
-        prop_assert_eq!(editor.exposure_ev(), start.data.output.exposure_ev());
+        prop_assert_eq!(editor.scene().data.output.exposure_ev(), start.data.output.exposure_ev());
         (0..undone).for_each(|_| drop(editor.apply(Command::Redo)));
         prop_assert_eq!(&editor.scene().data.entities, &end.entities);
         prop_assert_eq!(&editor.scene().data.environment, &end.environment);

@@ -48,7 +48,7 @@ fn sliders_change_the_scene_and_undo_as_one() {
     for i in 1..9 {
         assert!(editor.apply(Command::SetSkyTurn(100.0 * i as f32)).changed.sky);
     }
-    assert!((editor.sky_turn_deg() - 80.0).abs() < 1e-3);
+    assert!((editor.scene().data.environment.turn_deg - 80.0).abs() < 1e-3);
     for i in 1..9 {
         assert!(editor.apply(Command::SetExposure(i as f32 / 4.0)).changed.exposure);
     }

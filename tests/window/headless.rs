@@ -15,7 +15,7 @@ use std::time::Duration;
 /// What is shown, which is what `render` makes of the same state.
 fn as_rendered(stand: &mut Stand, when: &str) -> Vec<[u8; 4]> {
     let shown = stand.shown();
-    let scene = stand.viewer.editor().scene().clone();
+    let scene = stand.viewer.editor.scene().clone();
     assert_eq!(apart(&shown, &stand.rendered(&scene)), 0, "{when}");
     shown
 }
@@ -24,7 +24,7 @@ fn as_rendered(stand: &mut Stand, when: &str) -> Vec<[u8; 4]> {
 fn what_is_shown_is_what_render_makes_of_the_state() {
     let Some(mut stand) = Stand::new("state") else { return };
     assert!(stand.viewer.is_baking(), "nothing is cached, so it is baked in the background");
-    assert!(stand.viewer.frame().is_none());
+    assert!(stand.viewer.frame.is_none());
     stand.turn();
     stand.ready();
     let first = as_rendered(&mut stand, "at first");
@@ -45,10 +45,10 @@ fn what_is_shown_is_what_render_makes_of_the_state() {
     stand.key(Key::Home);
     follows(&mut stand, "Home");
     "qq".chars().for_each(|letter| stand.letter(letter));
-    assert_eq!(stand.viewer.editor().selection, Some(1), "the ball");
+    assert_eq!(stand.viewer.editor.selection, Some(1), "the ball");
     follows(&mut stand, "the outline");
     let places = (0..SIZE[0]).flat_map(|x| (0..SIZE[1]).map(move |y| [x as f32, y as f32]));
-    let at = places.into_iter().find(|at| stand.viewer.editor().grabs(*at)).unwrap();
+    let at = places.into_iter().find(|at| stand.viewer.editor.grabs(*at)).unwrap();
     stand.drag(Button::Left, at, [at[0] + 30.0, at[1] + 10.0]);
     follows(&mut stand, "a drag of the ball");
     stand.viewer.apply(Command::SetExposure(0.5)).unwrap();
@@ -61,13 +61,13 @@ fn what_is_shown_is_what_render_makes_of_the_state() {
     "qqe".chars().for_each(|letter| stand.letter(letter));
     stand.turn();
     stand.ready();
-    assert!(stand.viewer.editor().scene().entities[1].emits);
+    assert!(stand.viewer.editor.scene().entities[1].emits);
     follows(&mut stand, "a new light");
     stand.key(Key::Escape);
     as_rendered(&mut stand, "after edits");
 
     // Back as it was, step by step.
-    while stand.viewer.editor().undo_count() > 0 {
+    while stand.viewer.editor.undo_count() > 0 {
         stand.viewer.event(Event::Key { key: Key::Letter('z'), control: true, repeat: false }).unwrap();
         stand.turn();
     }
@@ -94,12 +94,12 @@ fn what_is_shown_is_what_render_makes_of_the_state() {
 fn a_bake_shows_the_scene_without_shadows() {
     let Some(mut stand) = Stand::with("preview", |setup| setup.preview_after = Duration::ZERO) else { return };
     let shown = stand.shown();
-    assert!(stand.viewer.is_baking() && stand.viewer.frame().is_none());
+    assert!(stand.viewer.is_baking() && stand.viewer.frame.is_none());
     let colors: HashSet<[u8; 4]> = shown.iter().copied().collect();
     assert!(colors.len() > 50, "{} colours", colors.len());
     // The camera moves while the bake goes on.
     stand.drag(Button::Left, [20.0, 20.0], [60.0, 40.0]);
-    assert!(stand.viewer.frame().is_some() || apart(&shown, &stand.shown()) > 20, "a turn is not seen");
+    assert!(stand.viewer.frame.is_some() || apart(&shown, &stand.shown()) > 20, "a turn is not seen");
     stand.ready();
     as_rendered(&mut stand, "with its shadows");
 }
@@ -112,8 +112,8 @@ fn a_bake_shows_its_light_before_it_ends() {
         setup.frame.bake = bake::Options { groups: true, face_px: 256, ..bake::Options::default() };
     };
     let Some(mut stand) = Stand::with("lit", finer) else { return };
-    stand.until("light", |viewer| viewer.previewed() == Previewed::Light || viewer.frame().is_some());
-    assert!(stand.viewer.frame().is_none() && stand.viewer.is_baking(), "the whole was baked before");
+    stand.until("light", |viewer| viewer.previewed == Previewed::Light || viewer.frame.is_some());
+    assert!(stand.viewer.frame.is_none() && stand.viewer.is_baking(), "the whole was baked before");
     let first = stand.shown();
     stand.ready();
     let whole = stand.shown();
@@ -190,7 +190,7 @@ fn keys_that_wait_cost_one_rebuild() {
     let mut toggle = |count| {
         (0..count).for_each(|_| stand.letter('e'));
         stand.ready();
-        stand.viewer.build_count()
+        stand.viewer.build_count
     };
     let counts = [1, 1, 1, 1, 9].map(&mut toggle);
     assert_eq!(counts, [2, 3, 4, 5, 6]);
@@ -266,8 +266,8 @@ fn changed_shaders_are_rebuilt_and_broken_ones_are_not_used() {
     let plain = stand.shown();
     let write = |name: &str, text: &str| std::fs::write(folder.path().join(name), text).unwrap();
     write("draw.frag", "#version 460\nlayout(location = 0) out vec4 color;\nvoid main() { color = nonsense; }\n");
-    stand.until("the compiler's lines", |viewer| viewer.shader_error().is_some());
-    let error = stand.viewer.shader_error().unwrap().to_owned();
+    stand.until("the compiler's lines", |viewer| viewer.shader_error.is_some());
+    let error = stand.viewer.shader_error.as_ref().unwrap().to_owned();
     assert!(error.contains("draw.frag:3") && error.contains("nonsense"), "{error}");
     assert_eq!(apart(&plain, &stand.shown()), 0, "the pipeline before stays");
     // The floor is drawn as a grid, by a shader of its own.
@@ -278,7 +278,7 @@ fn changed_shaders_are_rebuilt_and_broken_ones_are_not_used() {
         );
         write(file, &format!("#version 460\nlayout(location = 0) out vec4 color;\n{red}"));
     }
-    stand.until("a good shader", |viewer| viewer.shader_error().is_none());
+    stand.until("a good shader", |viewer| viewer.shader_error.is_none());
     let red = stand.shown().iter().filter(|p| p[0] > 250 && p[1] == 0 && p[2] == 0).count();
     assert!(red > 10_000, "{red} red pixels");
     // A file that others include: the entry point itself is as it was.
@@ -288,9 +288,9 @@ fn changed_shaders_are_rebuilt_and_broken_ones_are_not_used() {
     }
     let cone = std::fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("glsl/merge_layout.glsl")).unwrap();
     write("merge_layout.glsl", &format!("{cone}\nnonsense\n"));
-    stand.until("the including shader's error", |viewer| viewer.shader_error().is_some());
-    assert!(stand.viewer.shader_error().unwrap().contains("merge_layout.glsl"));
+    stand.until("the including shader's error", |viewer| viewer.shader_error.is_some());
+    assert!(stand.viewer.shader_error.as_ref().unwrap().contains("merge_layout.glsl"));
     write("merge_layout.glsl", &cone);
-    stand.until("a good include", |viewer| viewer.shader_error().is_none());
+    stand.until("a good include", |viewer| viewer.shader_error.is_none());
     assert_eq!(apart(&plain, &stand.shown()), 0);
 }

@@ -17,16 +17,16 @@ fn a_dropped_file_opens() {
         path
     };
     let said = |stand: &Stand| stand.viewer.message().unwrap().to_owned();
-    let own = stand.viewer.editor().path().to_owned();
+    let own = stand.viewer.editor.path().to_owned();
     let plain = stand.shown();
 
     // What cannot be opened is one line, also while the overlay is hidden, and the scene stays.
-    assert!(!stand.viewer.editor().overlay);
+    assert!(!stand.viewer.editor.overlay);
     for (name, text) in [("bad.toml", "[camera"), ("bad.glb", "glTF"), ("bad.obj", "f 1 2 3"), ("notes.txt", "words")] {
         stand.viewer.open(&write(name, text.as_bytes())).unwrap();
         let line = said(&stand);
         assert!(line.starts_with("not opened: ") && line.contains(name) && line.lines().count() == 1, "{line}");
-        assert_eq!(stand.viewer.editor().path(), own);
+        assert_eq!(stand.viewer.editor.path(), own);
     }
     stand.viewer.open(&folder.path().join("missing.toml")).unwrap();
     assert!(said(&stand).contains("missing.toml"));
@@ -50,22 +50,22 @@ fn a_dropped_file_opens() {
         stand.viewer.open(next).unwrap();
         let line = said(&stand);
         assert!(line.contains("unsaved edits of") && line.contains(&path.display().to_string()), "{line}");
-        assert_eq!(stand.viewer.editor().path(), path);
+        assert_eq!(stand.viewer.editor.path(), path);
         stand.viewer.open(next).unwrap();
         stand.ready();
-        assert_eq!(stand.viewer.editor().path(), next);
+        assert_eq!(stand.viewer.editor.path(), next);
         assert!(apart(&plain, &stand.shown()) > 100, "{} is seen", next.display());
         path = next.to_owned();
     }
     // Nor does the next scene come, or the window close, over unsaved edits at the first time.
     stand.viewer.apply(Command::SetExposure(0.7)).unwrap();
     stand.viewer.apply(Command::NextScene).unwrap();
-    assert_eq!(stand.viewer.editor().path(), path);
+    assert_eq!(stand.viewer.editor.path(), path);
     stand.viewer.apply(Command::SetExposure(0.6)).unwrap();
     stand.viewer.apply(Command::Quit).unwrap();
-    assert!(!stand.viewer.wants_to_quit(), "a new edit is asked for anew");
+    assert!(!stand.viewer.quit, "a new edit is asked for anew");
     stand.viewer.apply(Command::Quit).unwrap();
-    assert!(stand.viewer.wants_to_quit());
+    assert!(stand.viewer.quit);
 }
 
 /// What a dropped glTF file loses is said; where that is not allowed, the file is not opened.

@@ -85,7 +85,7 @@ impl Stand {
     }
 
     pub fn ready(&mut self) {
-        self.until("a first frame", |viewer| viewer.frame().is_some() && !viewer.is_baking());
+        self.until("a first frame", |viewer| viewer.frame.is_some() && !viewer.is_baking());
     }
 
     /// What is shown, RGBA.
@@ -97,11 +97,11 @@ impl Stand {
 
     /// The state rendered by a frame of its own, encoded.
     pub fn rendered(&self, scene: &Scene) -> Vec<[u8; 4]> {
-        let editor = self.viewer.editor();
+        let editor = &self.viewer.editor;
         let baker = Baker::new(&self.gpu.device, &self.gpu.library);
         let cache = Cache::new(Some(&self.cache));
         let mut frame = Frame::new(&baker, &cache, scene, self.options, &|_, _, _| ()).unwrap();
-        let white = (-editor.exposure_ev()).exp2();
+        let white = (-editor.scene().data.output.exposure_ev()).exp2();
         frame.render(&scene.at(editor.time_s), Some(white)).unwrap();
         let encode = |c: f32| (255.0 * srgb_from_linear(c / white)).round() as u8;
         frame.picture().chunks_exact(3).map(|p| [encode(p[0]), encode(p[1]), encode(p[2]), 255]).collect()

@@ -184,7 +184,7 @@ mod draco {
         if packed.buffer_view >= document.root.buffer_views.len() {
             return Err(document.fail(place, format!("there is no bufferView {}", packed.buffer_view)));
         }
-        let decoded = decode(document.view(packed.buffer_view)?.0, document.bytes_left());
+        let decoded = decode(document.view(packed.buffer_view)?.0, document.bytes_left);
         let decoded = decoded.map_err(|what| document.fail(&place, format!("its data are damaged: {what}")))?;
         let count = decoded.num_points();
 

@@ -53,7 +53,8 @@ pub struct Document {
     pub nodeless_channels: usize,
     path: PathBuf,
     buffers: Vec<Option<Vec<u8>>>,
-    bytes_left: u64,
+    /// How many more bytes all buffers may hold.
+    pub bytes_left: u64,
     numbers_left: Cell<u64>,
 }
 
@@ -143,12 +144,6 @@ impl Document {
             let what = format!("bytes {} to {} leave a buffer of {}", range.start, range.end, bytes.len());
             self.fail(place, what)
         })
-    }
-
-    /// How many more bytes all buffers may hold.
-    #[cfg(feature = "decoders")]
-    pub fn bytes_left(&self) -> u64 {
-        self.bytes_left
     }
 
     /// Takes numbers off what may be read from accessors.

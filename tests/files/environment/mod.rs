@@ -207,13 +207,14 @@ fn a_picture_is_kept_under_another_description() {
     let source = of_image(&file, 1.0);
     let sky = build(&source);
     std::fs::remove_file(&file).unwrap();
-    let brighter = sky.with(&EnvironmentData { strength: 2.0, ..source.clone() }).unwrap();
+    let bright = EnvironmentData { strength: 2.0, ..source.clone() };
+    let brighter = sky.with(&bright).unwrap();
     assert_eq!(brighter.radiance(DVec3::X), [2.0; 3]);
     assert!(sky.with(&of_image(Path::new("other.exr"), 1.0)).is_err());
     assert!(sky.with(&EnvironmentData::default()).unwrap().is_none());
     let dark = sky.with(&EnvironmentData { strength: 0.0, ..source }).unwrap();
     assert!(dark.is_none() && dark.coefficients(3).iter().flatten().all(|c| *c == 0.0));
-    assert_eq!(dark.with(brighter.source()).unwrap().radiance(DVec3::Y), [2.0; 3]);
+    assert_eq!(dark.with(&bright).unwrap().radiance(DVec3::Y), [2.0; 3]);
 }
 
 #[test]

@@ -11,7 +11,7 @@ use shadow_fields::sh::quadrature::sphere_rule;
 const SUMS: f64 = 1e-12;
 
 fn multiply(tensor: &Tensor, a: &[f64], b: &[f64]) -> Vec<f64> {
-    let mut out = vec![f64::NAN; coefficient_count(tensor.bands())];
+    let mut out = vec![f64::NAN; coefficient_count(tensor.bands)];
     tensor.multiply(a, b, &mut out);
     out
 }

@@ -7,8 +7,8 @@ READ_UINT(1, Entries, entries, entry_at)
 READ_VEC4(2, Far, far, far_at) // two a run, world: its middle; its mean normal, and the area that faces that way
 READ_VEC4(3, RunLight, run_light, run_light_at)
 
-// Light of what rests, as flat discs with nothing between: `count` entries of runs and their weights. Returns the sums of
-// shares of the cosine-weighted hemisphere times radiosity, and of the shares.
+// Light of what rests, as flat discs: `count` entries of runs and their weights, with nothing else between. Returns the
+// sums of shares of the cosine-weighted hemisphere times radiosity, and of the shares.
 //
 // A disc's share is that of its middle as if seen from afar, but for two things that keep it right nearby, where the sum
 // over a plane of discs was short by up to two thirds. Places over the disc count as over its middle, and the cosine is

@@ -166,7 +166,9 @@ impl SurfacePlan {
             let screens = if among_screens { screens.clone() } else { Vec::new() };
             let plan =
                 GroupPlan { entities, members, wanted, bands, refinement, screens, key: None, volume: None }.named();
-            let moved = plan.moved_among(scene);
+            // Of the sky, and of surfaces that light bounces from.
+            let has_use = wanted.transfer || options.groups;
+            let moved = has_use.then(|| plan.moved_among(scene)).flatten();
             let volume = moved.and_then(|(wanted, radius_m)| {
                 let name = plan.key.clone().unwrap_or_else(|| plan.name());
                 VolumePlan::new(&name, wanted, radius_m, options.bands)
@@ -260,11 +262,7 @@ impl GroupPlan {
     fn moved_among(&self, scene: &Scene) -> Option<([DVec3; 2], f64)> {
         let blocks = self.occluders();
         let rests = self.entities.first().is_some_and(|first| scene.is_at_rest(*first));
-        if !rests
-            || !self.wanted.transfer
-            || self.members.len() == 1
-            || blocks.iter().filter(|blocks| **blocks).count() < 2
-        {
+        if !rests || self.members.len() == 1 || blocks.iter().filter(|blocks| **blocks).count() < 2 {
             return None;
         }
         // What may be put anywhere is looked for where more than a ground stands.
@@ -436,6 +434,11 @@ impl<'p> Group<'p> {
     /// A place of the world in the group's frame.
     pub fn place(&self, world: DVec3) -> Vec3A {
         ((world - self.centre) / self.radius_m).as_vec3a()
+    }
+
+    /// A length of the group's frame.
+    pub fn metres(&self, length: f32) -> f32 {
+        length * self.radius_m as f32
     }
 
     fn space(&self, member: usize) -> GroupSpace<'_> {

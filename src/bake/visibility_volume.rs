@@ -4,7 +4,7 @@ use super::own_visibility::sphere;
 use super::surfaces::{BURIED_BACKS, BURIED_BLOCKED, Group, GroupPlan};
 use super::{BakeReport, Progress};
 use crate::field::quantity::channel_stride;
-use crate::field::visibility_volume::{NodeBox, VisibilityVolume};
+use crate::field::visibility_volume::{DEPTHS, NodeBox, VisibilityVolume, depth_texel};
 use crate::sh::basis::coefficient_count;
 use glam::{DVec3, Mat3A, UVec3, Vec3A};
 use rayon::prelude::*;
@@ -12,7 +12,7 @@ use serde::{Deserialize, Serialize};
 use std::time::Instant;
 
 /// Counts in every name of the cache: another number where a bake computes something else.
-const VERSION: u32 = 2;
+const VERSION: u32 = 3;
 /// Most nodes of a volume.
 const NODES: u32 = 10_000;
 /// So many members, each of which takes [`LEAST`] of the view, are seen on average where a volume is of use. Sky alone,
@@ -48,6 +48,7 @@ impl VolumePlan {
 #[derive(Clone)]
 struct Node {
     blocked: Vec<f32>,
+    depths: Vec<f32>,
     /// How many members take [`LEAST`] of its view.
     crowd: usize,
     buried: bool,
@@ -61,6 +62,7 @@ impl GroupPlan {
         // The same rays leave every node, so that what is left of their error is smooth.
         let rays = sphere();
         let toward: Vec<Vec3A> = rays.iter().map(|ray| ray.local).collect();
+        let texels: Vec<usize> = toward.iter().map(|ray| depth_texel(ray.as_dvec3())).collect();
         let blocks = self.occluders();
         let stride = channel_stride(plan.bands);
         let coefficients = coefficient_count(plan.bands);
@@ -71,7 +73,10 @@ impl GroupPlan {
             let mut blocked = vec![0.0; stride];
             let mut met = vec![0; blocks.len()];
             let mut behind = 0;
-            for (ray, hit) in rays.iter().zip(&hits) {
+            let mut depths = vec![0.0_f32; DEPTHS];
+            for ((ray, texel), hit) in rays.iter().zip(&texels).zip(&hits) {
+                let depth = hit.as_ref().map_or(f32::MAX, |hit| group.metres(hit.distance));
+                depths[*texel] = depths[*texel].max(depth);
                 let Some(hit) = hit else { continue };
                 blocked[..coefficients].iter_mut().zip(&ray.share).for_each(|(sum, share)| *sum += share);
                 met[hit.member as usize] += 1;
@@ -81,7 +86,7 @@ impl GroupPlan {
             let all = met.iter().sum();
             let buried = share(all) > BURIED_BLOCKED && share(behind) > BURIED_BACKS * share(all);
             let crowd = met.into_iter().filter(|met| share(*met) >= LEAST).count();
-            Node { blocked, crowd, buried }
+            Node { blocked, depths, crowd, buried }
         };
         let count = plan.nodes.count();
         let probed: Vec<Node> = (0..count as u32).into_par_iter().step_by(PROBE).map(look).collect();
@@ -89,7 +94,10 @@ impl GroupPlan {
         let report =
             |samples: usize| BakeReport { samples: samples as u32, total: started.elapsed(), ..Default::default() };
         if (free.iter().sum::<usize>() as f64) < CROWD * free.len().max(1) as f64 {
-            return (VisibilityVolume { nodes: plan.nodes, stride, blocked: Vec::new() }, report(probed.len()));
+            return (
+                VisibilityVolume { nodes: plan.nodes, stride, blocked: Vec::new(), depths: Vec::new() },
+                report(probed.len()),
+            );
         }
         let mut nodes: Vec<Node> = Vec::with_capacity(count);
         let row = plan.nodes.counts.x * plan.nodes.counts.y;
@@ -98,12 +106,13 @@ impl GroupPlan {
             progress(nodes.len() as u32, count as u32);
         }
         fill(&mut nodes, plan.nodes.counts);
+        let depths = nodes.iter().flat_map(|node| node.depths.iter().copied()).collect();
         let blocked = nodes.into_iter().flat_map(|node| node.blocked).collect();
-        (VisibilityVolume { nodes: plan.nodes, stride, blocked }, report(count))
+        (VisibilityVolume { nodes: plan.nodes, stride, blocked, depths }, report(count))
     }
 }
 
-/// Gives buried nodes the mean of their neighbours that are not, from the surface inwards.
+/// Gives buried nodes the mean of their neighbours that are not, and the largest depths, from the surface inwards.
 fn fill(nodes: &mut [Node], counts: UVec3) {
     let strides = [1, counts.x as usize, (counts.x * counts.y) as usize];
     let beside = |i: usize| {
@@ -117,7 +126,9 @@ fn fill(nodes: &mut [Node], counts: UVec3) {
             let free: Vec<&Node> = beside(i).map(|other| &nodes[other]).filter(|other| !other.buried).collect();
             let sum = |k: usize| free.iter().map(|node| node.blocked[k]).sum::<f32>() / free.len() as f32;
             let blocked = || (0..nodes[i].blocked.len()).map(sum).collect();
-            (!free.is_empty()).then(|| (i, Node { blocked: blocked(), crowd: 0, buried: false }))
+            let farthest = |texel: usize| free.iter().map(|node| node.depths[texel]).fold(0.0, f32::max);
+            let depths = || (0..DEPTHS).map(farthest).collect();
+            (!free.is_empty()).then(|| (i, Node { blocked: blocked(), depths: depths(), crowd: 0, buried: false }))
         };
         let buried = (0..nodes.len()).filter(|&i| nodes[i].buried);
         let filled: Vec<(usize, Node)> = buried.filter_map(mean).collect();
@@ -136,16 +147,19 @@ pub(super) struct StoredVolume {
 
 impl VolumePlan {
     pub(super) fn store(&self, volume: &VisibilityVolume) -> (StoredVolume, Vec<u8>) {
-        (StoredVolume { key: self.key.clone() }, bytemuck::cast_slice(&volume.blocked).to_vec())
+        let floats = [&volume.blocked[..], &volume.depths].concat();
+        (StoredVolume { key: self.key.clone() }, bytemuck::cast_slice(&floats).to_vec())
     }
 
     /// What header and payload hold; `None` where they hold something else.
     pub(super) fn restore(&self, header: &StoredVolume, payload: &[u8]) -> Option<VisibilityVolume> {
         let nodes = self.nodes;
         let stride = channel_stride(self.bands);
-        let fits = payload.is_empty() || payload.len() == 4 * nodes.count() * stride;
-        let blocked = || bytemuck::pod_collect_to_vec(payload);
-        (header.key == self.key && fits).then(|| VisibilityVolume { nodes, stride, blocked: blocked() })
+        let floats: Vec<f32> = bytemuck::pod_collect_to_vec(payload);
+        let fits = floats.is_empty() || floats.len() == nodes.count() * (stride + DEPTHS);
+        let (blocked, depths) = floats.split_at_checked(floats.len() / (stride + DEPTHS) * stride)?;
+        let volume = || VisibilityVolume { nodes, stride, blocked: blocked.to_vec(), depths: depths.to_vec() };
+        (header.key == self.key && fits).then(volume)
     }
 }
 

@@ -19,6 +19,7 @@ use crate::bake::links::{self, RUN_BITS, RUNS, Runs};
 use crate::bake::surfaces::Links;
 use crate::error::Result;
 use crate::field::cuboid::Cuboid;
+use crate::field::visibility_volume::SceneVolume;
 use crate::gpu::{Access, Bind, Buffer, BufferKind, Commands, ComputePipeline, Device, TexelView};
 use crate::layout::{CLUSTER_VERTICES, QUAD_FORMAT};
 use crate::lists::far::{FarRun, FarRuns};
@@ -88,14 +89,16 @@ pub struct Linked {
 }
 
 impl Linked {
-    /// The links of a scene's entities, of which those of one list of `rigid` never move against each other; `None` where
-    /// no vertex has any and nothing moves, or where there are more runs than links can number.
-    pub fn new(entities: &[LinkedEntity<'_>], rigid: &[Vec<usize>]) -> Option<Self> {
+    /// The links of a scene's entities, of which those of one list of `rigid` never move against each other; `volume` tells
+    /// what moves which of the others it sees. `None` where no vertex has any and nothing moves, or where there are more
+    /// runs than links can number.
+    pub fn new(entities: &[LinkedEntity<'_>], rigid: &[Vec<usize>], volume: Option<Arc<SceneVolume>>) -> Option<Self> {
         let vertices = entities.iter().map(|entity| entity.order.len()).sum();
         let mut linked = Linked {
             areas: vec![0.0; vertices],
             ranges: vec![[0, 0]; vertices],
             surfaces: Surfaces::new(entities),
+            far: FarRuns { volume, ..FarRuns::default() },
             receives: entities.iter().any(|entity| !entity.rests && entity.receives),
             ..Linked::default()
         };

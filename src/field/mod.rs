@@ -7,6 +7,7 @@ pub mod file;
 pub mod fit;
 pub mod lamp_colors;
 pub mod lattice;
+pub(crate) mod octahedron;
 pub mod quantity;
 pub mod self_visibility;
 pub mod sheet;

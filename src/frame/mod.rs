@@ -142,7 +142,7 @@ impl Frame {
         let bounces = options.bounces != Bounces::None;
         let linked = bounces
             .then(|| links.into_iter().enumerate().map(linked).collect::<Vec<_>>())
-            .and_then(|entities| Linked::new(&entities, &rigid));
+            .and_then(|entities| Linked::new(&entities, &rigid, buffers.volume.clone()));
         let reflections = gloss::reflections(
             device,
             library,

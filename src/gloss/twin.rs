@@ -7,6 +7,7 @@ use super::{
     WIDENED, brdf,
 };
 use crate::bounce::twin::SeenLink;
+use crate::field::octahedron;
 use crate::sh::basis::values;
 use crate::sh::lobe::clamped_cosine;
 use glam::DVec3;
@@ -70,7 +71,7 @@ impl Twin {
 
     fn sky(&self, toward: DVec3, level: f64) -> DVec3 {
         let wide = SIDE + 2;
-        let place = (super::sky_map::place(toward) * SIDE as f64 + 1.0).to_array();
+        let place = (octahedron::place(toward) * SIDE as f64 + 1.0).to_array();
         let below = level.floor().clamp(0.0, (LEVELS - 2) as f64);
         let at = |level: f64| {
             let first = level as usize * wide * wide;

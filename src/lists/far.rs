@@ -3,8 +3,10 @@
 //! A cluster of vertices sees near pieces vertex by vertex, and far ones from its middle, as SH for all its vertices.
 
 use crate::bake::links;
+use crate::field::visibility_volume::SceneVolume;
 use glam::Vec3;
 use std::ops::Range;
+use std::sync::Arc;
 
 /// A run is opened where it is larger than this share of its distance.
 const MOST_RADIUS: f32 = 0.8;
@@ -51,6 +53,8 @@ pub struct FarRuns {
     pub runs: Vec<FarRun>,
     /// The largest runs at rest.
     pub roots: Vec<u32>,
+    /// What tells which of them are seen from where; all are where there is none.
+    pub volume: Option<Arc<SceneVolume>>,
 }
 
 /// What a cluster sees of all that rests: runs below their weights, packed as links are.
@@ -69,6 +73,12 @@ impl FarRuns {
         cut
     }
 
+    /// How much of what stands at a target is seen from a place.
+    fn seen(&self, place: Vec3, target: Vec3) -> f32 {
+        let sees = |volume: &Arc<SceneVolume>| volume.volume.sees(place.as_dvec3(), target.as_dvec3()) as f32;
+        self.volume.as_ref().map_or(1.0, sees)
+    }
+
     fn cut_below(&self, number: u32, weight: f32, eye: (Vec3, f32), out: &mut Cut) {
         let run = &self.runs[number as usize];
         let across = run.across.length();
@@ -83,10 +93,11 @@ impl FarRuns {
         let round = if across < FLAT * run.area_m2 { (run.area_m2 / LEAST_SHARE).sqrt() } else { 0.0 };
         let size = (run.radius_m / MOST_RADIUS).max(round) / gap;
         let opened = if run.parts.is_empty() { 0.0 } else { fade(size, [FADE, 1.0]) };
-        if run.area_m2 > 0.0 {
+        if run.area_m2 > 0.0 && opened < 1.0 {
             let near = 1.0 - fade(gap / radius_m, NEAR);
-            out.near.extend(pack(weight * (1.0 - opened) * near, number));
-            out.far.extend(pack(weight * (1.0 - opened) * (1.0 - near), number));
+            let seen = weight * (1.0 - opened) * self.seen(centre, run.middle);
+            out.near.extend(pack(seen * near, number));
+            out.far.extend(pack(seen * (1.0 - near), number));
         }
         if opened > 0.0 {
             run.parts.clone().for_each(|part| self.cut_below(part, weight * opened, eye, out));
@@ -127,7 +138,7 @@ mod tests {
         };
         let large = (0..4).map(|i| run(i as f32 + 0.5, 1.0, 4 + 4 * i..8 + 4 * i));
         let small = (0..16).map(|i| run((i as f32 + 0.5) / 4.0, 0.25, 0..0));
-        let tree = FarRuns { runs: large.chain(small).collect(), roots: (0..4).collect() };
+        let tree = FarRuns { runs: large.chain(small).collect(), roots: (0..4).collect(), volume: None };
         let mut sizes = Vec::new();
         for (x, radius) in [(0.3, 0.1), (-0.6, 0.05), (1.7, 0.0), (20.0, 1.0), (-1.2, 0.2), (0.5, 9.0)] {
             let Cut { near, far } = tree.cut(Vec3::new(x, 0.1, 0.0), radius);

@@ -228,6 +228,26 @@ fn dark_vertices(scene: &Scene) -> Vec<Vertex> {
     receiver_vertices(scene).into_iter().filter(is_dark).collect()
 }
 
+/// What moves in a dark room is not lit through the wall by the room beyond, whether or not there is a sky.
+#[test]
+fn what_moves_is_not_lit_through_walls() {
+    let Some(gpu) = gpu() else { return };
+    let spin = vec![Motion::Spin { axis: Vec3::Y, period_s: 9.0 }];
+    let place = Vec3::new(-1.9, -0.2, 1.6);
+    let ball = EntityData { position: place, motion: spin, ..stands("ball", 0.0, 0.0) };
+    let scene = rooms().mesh("ball", generate::sphere(0.3, 2)).entity(ball).build().unwrap();
+    let placements = scene.at(0.0);
+    let light = gpu.light(&mut frame_of_rooms(&gpu, &scene), &placements);
+    let ball = receiver_vertices(&scene).into_iter().filter(|v| v.entity == 5);
+    let ball: Vec<Vertex> = ball.step_by(3).collect();
+    let world = World::of(&scene, &placements);
+    let rays = RayCast { rays: 2048, bounces: 1, ..RayCast::default() }.run(&world, &ball);
+    let wanted: f64 = rays.iter().map(|truth| truth.radiosity[0]).sum();
+    let found: f64 = ball.iter().map(|v| f64::from(light[5][v.index][0])).sum();
+    println!("{found} {wanted}");
+    assert!(ball.len() > 40 && (found / wanted - 1.0).abs() < 0.5, "{found}, by rays {wanted}");
+}
+
 /// A door that moves shuts light out, where one that stands aside lets it in.
 #[test]
 fn no_light_bounces_through_a_shut_door() {

@@ -19,6 +19,8 @@ const NODES: u32 = 10_000;
 /// relative RMS of what moves by single fields and by the volume: between walls (6 to 8 members) 0.20 to 0.46 and 0.05 to
 /// 0.08, in a garden (5) 0.06 and 0.025, past a post and a teapot on a floor (2) 0.012 and 0.020.
 const CROWD: f64 = 4.0;
+/// It is of use too where so much of the view is blocked: there walls hide what lights what moves.
+const ENCLOSED: f64 = 0.7;
 const LEAST: f64 = 0.01;
 /// One node in so many tells whether it is.
 const PROBE: usize = 29;
@@ -40,7 +42,7 @@ impl VolumePlan {
         if f64::from(nodes.step_m) > radius_m {
             return None;
         }
-        let numbers = format!("{VERSION} {CROWD} {LEAST} {PROBE} {bands} {nodes:?} {group}");
+        let numbers = format!("{VERSION} {CROWD} {ENCLOSED} {LEAST} {PROBE} {bands} {nodes:?} {group}");
         Some(VolumePlan { nodes, bands, key: blake3::hash(numbers.as_bytes()).to_hex()[..32].to_owned() })
     }
 }
@@ -51,6 +53,8 @@ struct Node {
     depths: Vec<f32>,
     /// How many members take [`LEAST`] of its view.
     crowd: usize,
+    /// Share of its view that is blocked.
+    enclosed: f64,
     buried: bool,
 }
 
@@ -83,17 +87,18 @@ impl GroupPlan {
                 behind += usize::from(hit.from_behind);
             }
             let share = |met: usize| met as f64 / rays.len() as f64;
-            let all = met.iter().sum();
-            let buried = share(all) > BURIED_BLOCKED && share(behind) > BURIED_BACKS * share(all);
+            let enclosed = share(met.iter().sum());
+            let buried = enclosed > BURIED_BLOCKED && share(behind) > BURIED_BACKS * enclosed;
             let crowd = met.into_iter().filter(|met| share(*met) >= LEAST).count();
-            Node { blocked, depths, crowd, buried }
+            Node { blocked, depths, crowd, enclosed, buried }
         };
         let count = plan.nodes.count();
         let probed: Vec<Node> = (0..count as u32).into_par_iter().step_by(PROBE).map(look).collect();
-        let free: Vec<usize> = probed.iter().filter(|node| !node.buried).map(|node| node.crowd).collect();
+        let free: Vec<&Node> = probed.iter().filter(|node| !node.buried).collect();
+        let mean = |of: &dyn Fn(&Node) -> f64| free.iter().map(|node| of(node)).sum::<f64>() / free.len().max(1) as f64;
         let report =
             |samples: usize| BakeReport { samples: samples as u32, total: started.elapsed(), ..Default::default() };
-        if (free.iter().sum::<usize>() as f64) < CROWD * free.len().max(1) as f64 {
+        if mean(&|node| node.crowd as f64) < CROWD && mean(&|node| node.enclosed) < ENCLOSED {
             return (
                 VisibilityVolume { nodes: plan.nodes, stride, blocked: Vec::new(), depths: Vec::new() },
                 report(probed.len()),
@@ -128,7 +133,8 @@ fn fill(nodes: &mut [Node], counts: UVec3) {
             let blocked = || (0..nodes[i].blocked.len()).map(sum).collect();
             let farthest = |texel: usize| free.iter().map(|node| node.depths[texel]).fold(0.0, f32::max);
             let depths = || (0..DEPTHS).map(farthest).collect();
-            (!free.is_empty()).then(|| (i, Node { blocked: blocked(), depths: depths(), crowd: 0, buried: false }))
+            (!free.is_empty())
+                .then(|| (i, Node { blocked: blocked(), depths: depths(), crowd: 0, enclosed: 0.0, buried: false }))
         };
         let buried = (0..nodes.len()).filter(|&i| nodes[i].buried);
         let filled: Vec<(usize, Node)> = buried.filter_map(mean).collect();

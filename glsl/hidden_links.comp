@@ -14,7 +14,7 @@ layout(local_size_x = WORKGROUP) in;
 READ_VEC4(2, Vertices, vertices, vertex_quad)
 READ_UVEC2(3, Ranges, ranges, range_at) // first link; how many, and above them the entity
 READ_UINT(4, Links, links, link_at)
-READ_VEC4(5, Places, places, place_at) // two a run, world: middle, and whether it rests; mean normal, and the area that faces that way
+READ_VEC4(5, Places, places, place_at) // two a run: its middle, world, and whether it rests; the second is not read here
 READ_VEC4(6, Edges, edges, edge_at) // three an entity: halves of a box's edges, its frame, in r
 READ_UINT(7, Directions, directions, direction_at) // of their rays
 layout(std430, binding = 8) buffer Hidden { uint hidden[]; };

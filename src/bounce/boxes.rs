@@ -3,7 +3,8 @@
 //! Of most things that move it is known how much of a vertex's view they take, and not which links that is: all are
 //! dimmed alike ([`super::movers`]), and through a closed door came most of the light of the room behind. Boxes in closed
 //! form ([`crate::field::cuboid`]) hide of each link what they hide of a round light that takes as much of the view, in
-//! the mean direction of its rays and as far away as its run. Such links serve the frame, and the boxes dim no others; the light that they reflect themselves comes as that of all movers.
+//! the mean direction of its rays and as far away as its run. Such links serve the frame, and the boxes dim no others;
+//! the light that they reflect themselves comes as that of all movers.
 
 use super::LinkedLight;
 use crate::bake::links;

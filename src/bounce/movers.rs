@@ -5,7 +5,8 @@
 //! that comes from there instead is the mean of those surfaces of the thing that face the vertex. The light that leaves
 //! it and its area, both by direction, are nine SH coefficients each, the light of its runs of vertices times a cosine
 //! lobe; their quotient towards the vertex is that mean. (Means of six sides were too bright below what is lit from
-//! above.) Of a box it is that of those faces that are seen from the vertex. How much of it the vertex sees past its own group say its map of self-visibility, or else its transfer.
+//! above.) Of a box it is that of those faces that are seen from the vertex. How much of it the vertex sees past its own
+//! group say its map of self-visibility, or else its transfer.
 //!
 //! What moves sees all that rests as flat discs: a cut of a tree of runs ([`crate::lists::far`]). How much of each is seen
 //! tells the visibility volume, if the scene has one.

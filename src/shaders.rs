@@ -2,8 +2,10 @@
 //! text that is generated from the tables of [`crate::sh`].
 
 use crate::error::{Error, Result};
+use crate::field::cuboid::PARALLEL;
 use crate::field::quantity::channel_stride;
 use crate::field::self_visibility;
+use crate::field::silhouette::{LEAST_PENUMBRA, LEAST_STEP, NEAREST, NO_BOX, TOUCHING};
 use crate::files;
 use crate::gpu::shader::ShaderSource;
 use crate::gpu::{Shader, Stage};
@@ -48,6 +50,16 @@ impl ShaderPermutation {
             .number("SELF_STEPS", self_visibility::DISTANCE_STEPS)
             .number("SELF_FIRST", self_visibility::DISTANCE_FIRST)
             .number("SELF_RAMP", self_visibility::RAMP)
+    }
+
+    /// Adds the macros of `outline.glsl` and `cuboid.glsl`.
+    pub fn outlines(self) -> Self {
+        self.number("NEAREST", NEAREST)
+            .number("PARALLEL", PARALLEL)
+            .number("NO_BOX", NO_BOX)
+            .number("TOUCHING", TOUCHING)
+            .number("LEAST_STEP", LEAST_STEP)
+            .number("LEAST_PENUMBRA", LEAST_PENUMBRA)
     }
 
     /// Adds a macro whose value is an f32.

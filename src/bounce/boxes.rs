@@ -9,8 +9,6 @@
 use super::LinkedLight;
 use crate::bake::links;
 use crate::error::Result;
-use crate::field::cuboid::PARALLEL;
-use crate::field::silhouette::{LEAST_PENUMBRA, LEAST_STEP, NEAREST, NO_BOX, TOUCHING};
 use crate::gpu::{Bind, Buffer, Commands, ComputePipeline, Device, Upload};
 use crate::layout::{CLUSTER_VERTICES, QUAD_FORMAT};
 use crate::merge::MergeInputs;
@@ -107,10 +105,5 @@ pub fn hidden_row(permutation: &MergePermutation) -> ShaderPermutation {
         .define("MOST_BOXES", MOST_SCREENS as u32)
         .define("BOXES", false)
         .define("CUBOIDS", true)
-        .number("NEAREST", NEAREST)
-        .number("PARALLEL", PARALLEL)
-        .number("NO_BOX", NO_BOX)
-        .number("TOUCHING", TOUCHING)
-        .number("LEAST_STEP", LEAST_STEP)
-        .number("LEAST_PENUMBRA", LEAST_PENUMBRA)
+        .outlines()
 }

@@ -133,7 +133,7 @@ impl Linked {
         }
         // No buffer is empty.
         linked.links.resize(linked.links.len().max(1), 0);
-        linked.directions.resize(linked.links.len(), 0);
+        linked.directions.resize(linked.directions.len().max(1), 0);
         Some(linked)
     }
 
@@ -194,9 +194,11 @@ impl Linked {
             from += u32::from(count);
         }
         self.links.extend(links.packed.iter().map(|link| link + base));
-        self.directions.extend(&links.directions);
-        // What moves itself hides nothing of its own.
-        self.directions.resize(self.links.len(), 0);
+        if self.surfaces.hide_links() {
+            self.directions.extend(&links.directions);
+            // What moves itself hides nothing of its own.
+            self.directions.resize(self.links.len(), 0);
+        }
     }
 }
 

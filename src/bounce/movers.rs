@@ -98,6 +98,11 @@ impl Surfaces {
         self.movers.is_empty()
     }
 
+    /// Whether boxes hide links.
+    pub fn hide_links(&self) -> bool {
+        !self.boxes.is_empty()
+    }
+
     /// Adds those members of a group that reflect, with runs numbered from `base`.
     pub fn add(&mut self, entities: &[LinkedEntity<'_>], members: &[usize], runs: &Runs, base: u32) {
         for (member, &index) in members.iter().enumerate().filter(|(_, index)| entities[**index].reflects) {

@@ -187,7 +187,7 @@ mod tests {
 
     fn fibonacci(i: usize, count: usize) -> DVec3 {
         let z = 1.0 - (2.0 * i as f64 + 1.0) / count as f64;
-        let (sine, cosine) = (i as f64 * 2.399963).sin_cos();
-        (1.0 - z * z).sqrt() * DVec3::new(cosine, sine, 0.0) + z * DVec3::Z
+        let turn = i as f64 * 2.399963;
+        (1.0 - z * z).sqrt() * DVec3::new(turn.cos(), turn.sin(), 0.0) + z * DVec3::Z
     }
 }

@@ -10,13 +10,10 @@ pub mod twin;
 
 use crate::bake::silhouette::SilhouetteOptions;
 use crate::error::Result;
-use crate::field::cuboid::PARALLEL;
 use crate::field::lamp_colors::{SHELL_STEP, SHELLS};
 use crate::field::lattice::CELL_WARP;
 use crate::field::sheet::{BEYOND as BEYOND_SHEET, CONTACT};
-use crate::field::silhouette::{
-    DEEP, HALF_DEPTH, INSIDE, LEAST_PENUMBRA, LEAST_STEP, NEAREST, NO_BOX, REACH, TOUCHING,
-};
+use crate::field::silhouette::{DEEP, HALF_DEPTH, INSIDE, REACH};
 use crate::field::silhouette_nodes::{BEYOND, EASED, LEAST_AHEAD};
 use crate::field::sub_light::{BLEND, CORNER, LIMIT_SINE, MOST_SINE, NEAR_LIGHT_STEPS, STRIP, THIN, TURNED_BY};
 use crate::gpu::{Bind, Buffer, Commands, ComputePipeline, Device, TexelView};
@@ -135,14 +132,8 @@ impl SharpPermutation {
             .define("MAP", self.silhouette.map_px);
         let numbers = [
             ("REACH", REACH),
-            ("NEAREST", NEAREST),
-            ("PARALLEL", PARALLEL),
-            ("NO_BOX", NO_BOX),
             ("SHELL_STEP", SHELL_STEP),
             ("LAST_SHELL", (SHELLS - 1) as f64),
-            ("TOUCHING", TOUCHING),
-            ("LEAST_STEP", LEAST_STEP),
-            ("LEAST_PENUMBRA", LEAST_PENUMBRA),
             ("INSIDE_FROM", INSIDE[0]),
             ("INSIDE_TO", INSIDE[1]),
             ("HALF_DEPTH", HALF_DEPTH),
@@ -171,7 +162,7 @@ impl SharpPermutation {
             ("WARP_1", CELL_WARP[1]),
             ("WARP_2", CELL_WARP[2]),
         ];
-        numbers.into_iter().fold(row, |row, (name, value)| row.number(name, value)).self_visibility()
+        numbers.into_iter().fold(row, |row, (name, value)| row.number(name, value)).outlines().self_visibility()
     }
 
     /// The permutation with the loops that the device wants, and with storage blocks where its texel views cannot hold

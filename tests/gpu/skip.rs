@@ -144,10 +144,12 @@ fn what_no_receiver_sees_is_not_baked() {
          [[mesh]]\nname = \"ball\"\nsphere = { radius_m = 0.3, subdivisions = 2 }\n\
          [[mesh]]\nname = \"ring\"\ntorus = { major_m = 0.3, minor_m = 0.1, segments = 12, sides = 6 }\n\
          [[entity]]\nmesh = \"ball\"\n[[entity]]\nmesh = \"ring\"\nposition = [0, 0.5, 0]\nreceives = false\n";
-    let (scene, pair) = (scene(ball_and_ring), scene(&format!("{ball_and_ring}{FAR_PATCH}")));
+    let pair = scene(&format!("{ball_and_ring}{FAR_PATCH}"));
+    let scene = scene(ball_and_ring);
     let mut with = gpu.frame(&scene, small());
     let mut seen = gpu.frame(&pair, small());
-    let (alone, beside) = (gpu.light(&mut with, &scene.at(0.0)), gpu.light(&mut seen, &pair.at(0.0)));
+    let alone = gpu.light(&mut with, &scene.at(0.0));
+    let beside = gpu.light(&mut seen, &pair.at(0.0));
     assert_eq!(alone[0], beside[0]);
     let bytes = [&with, &seen].map(|frame| frame.buffers.fields.size_bytes);
     assert_eq!(2 * bytes[0], bytes[1], "one field of two alike is baked");

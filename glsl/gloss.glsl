@@ -15,6 +15,7 @@ struct View {
     float z;     // cosine between them, above 0
     float alpha; // width of the microfacets' slopes
     vec3 ground; // as the normal, of the surface itself, which textures do not tilt
+    float footprint; // square of the radius of a pixel, as a disc of slopes
 };
 
 View view_of(vec3 from_eye, vec3 normal, float roughness) {
@@ -24,6 +25,7 @@ View view_of(vec3 from_eye, vec3 normal, float roughness) {
     view.z = max(dot(view.normal, view.toward), LEAST_VIEW_Z);
     view.alpha = max(roughness * roughness, LEAST_ALPHA);
     view.ground = view.normal;
+    view.footprint = 0.0;
     return view;
 }
 
@@ -133,52 +135,27 @@ float half_cosine(View view, vec3 along) {
     return max(sqrt(max(0.5 + 0.5 * dot(along, view.toward), 0.0)), 1e-4);
 }
 
-// The lobe towards a part of the light, without Schlick's term. `along` is unit, to its middle, `lit` its cosine to the
-// normal and `omega` its solid angle. The part counts as a point, and the slopes are as much wider as it is wide.
-float lobe_of_part(View view, vec3 along, float lit, float omega) {
+// Share of the microfacets whose slopes lie in a disc. Slopes are in widths of the lobe; `away` is the square of the
+// distance of the disc's middle from no slope, `radius` the square of its radius. GGX, 1 / pi (1 + p^2)^2, is a uniform
+// sphere projected stereographically, and discs are its caps.
+float share_in_disc(float away, float radius) {
+    float apart = 1.0 + away - radius, scale = sqrt(apart * apart + 4.0 * radius);
+    return apart > 0.0 ? 2.0 * radius / (scale * (scale + apart)) : 0.5 - 0.5 * apart / scale;
+}
+
+// Light that all microfacets would reflect from a direction, without Schlick's term, if all of them mirrored it; `lit` is
+// its cosine to the normal.
+float mirrored(View view, vec3 along, float lit) {
     float view_half = half_cosine(view, along);
-    float half_z = max(dot(view.normal, along + view.toward) / (2.0 * view_half), 0.0);
-    float slopes = min(omega / max(4.0 * view_half * half_z * half_z * half_z, 1e-30), MOST_SLOPES);
-    float widened = view.alpha * view.alpha + WIDENED * slopes;
-    float below = (widened - 1.0) * half_z * half_z + 1.0;
-    return widened / (PI * below * below) * masking(view, lit);
-}
-#endif
-
-#if HIGHLIGHTS
-// The reflection of a part of a light, of radiance 1: `along` unit, to its middle; `sine` of its angular radius, `omega`
-// its solid angle.
-vec2 reflect_part(View view, vec3 along, float sine, float omega) {
-    float cosine = part_cosine(dot(view.normal, along), sine);
-    float lit = max(dot(view.normal, along), cosine);
-    float value = lobe_of_part(view, along, lit, omega) * cosine * omega;
-    float term = schlick(half_cosine(view, along));
-    return cosine > 0.0 ? value * vec2(1.0 - term, term) : vec2(0.0);
+    float half_z = max(dot(view.normal, along + view.toward) / (2.0 * view_half), LEAST_HALF_Z);
+    return 4.0 * view_half / half_z * masking(view, lit) * lit;
 }
 
-// The reflection of a whole light, of radiance 1; `to` leads to its centre.
-vec2 reflect_light(View view, vec3 to, Entity shining) {
-    SeenLight light = seen_light(to, shining);
-    mat3 axes = mat3(light.toward, light.across, light.down);
-    vec2 sum = vec2(0.0);
-    // A light that is small against the lobe is one part.
-    bool whole = light.sine * light.sine < WHOLE_LIGHT * view.alpha * view.alpha;
-    uint b = light.fine >= 1.0 ? 1 : 0, last = light.fine <= 0.0 || whole ? 0 : 4;
-    do {
-        Block block = block_of(light, whole ? 0 : b);
-        block.scale = whole ? 0.0 : block.scale;
-        block.area = whole ? 1.0 : block.area;
-        block.weight = whole ? 1.0 : block.weight;
-        uint k = 0, parts = whole ? 1 : 4;
-        do {
-            vec2 part = part_place(light, block, k);
-            vec3 along = along_axes(light, part);
-            float omega = part_light(light, block, part, along);
-            sum += block.weight * reflect_part(view, axes * along, part_sine(light, block, part, along), omega);
-            k++;
-        } while (k < parts);
-        b++;
-    } while (b <= last);
-    return sum;
+// The share of the microfacets that mirror a small part of a light of solid angle `omega`.
+float mirroring(View view, vec3 along, float omega) {
+    float view_half = half_cosine(view, along);
+    float half_z = clamp(dot(view.normal, along + view.toward) / (2.0 * view_half), LEAST_HALF_Z, 1.0);
+    float square = view.alpha * view.alpha, cosine = half_z * half_z;
+    return share_in_disc((1.0 - cosine) / (cosine * square), omega / (4.0 * PI * view_half * half_z * cosine * square));
 }
 #endif

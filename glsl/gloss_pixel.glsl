@@ -14,6 +14,9 @@ layout(location = 10) centroid in vec4 shares;
 #define TABLE_BINDING GLOSS_BINDING + 4
 #define SKY MIRROR
 #include "gloss.glsl"
+#if HIGHLIGHTS
+#include "highlight.glsl"
+#endif
 
 #if TEXTURED
 layout(binding = GLOSS_BINDING + 5) uniform sampler2D gloss_picture;  // green: roughness, blue: metal
@@ -96,6 +99,9 @@ vec3 glossy(uint index, vec3 base, vec3 light, vec4 share, vec2 uv, float within
     energy = of_unit.x + of_unit.y;
 #endif
 #if HIGHLIGHTS
+    // A disc of half of a pixel's area.
+    vec3 turn_x = dFdx(view.normal), turn_y = dFdy(view.normal);
+    view.footprint = (dot(turn_x, turn_x) + dot(turn_y, turn_y)) / (4.0 * PI);
     // Loops are tested at their ends, as in the merge. What is NONE has no share.
     uint i = 0;
     do {

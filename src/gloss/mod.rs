@@ -44,12 +44,10 @@ pub const LEAST_VIEW_Z: f64 = 1e-3;
 pub const LEAST_ENERGY: f64 = 0.1;
 /// Most by which a normal map brightens diffuse light.
 pub const MOST_TILTED: f64 = 4.0;
-/// How much wider slopes become by the width of a part of a light that counts as a point.
-pub const WIDENED: f64 = 0.35;
-/// Largest area of slopes by which they become wider: where view and light graze it has no bound.
-pub const MOST_SLOPES: f64 = 1.0;
-/// A light counts as one part where the square of the sine of its radius is below this share of that of alpha.
-pub const WHOLE_LIGHT: f64 = 0.05;
+/// Least cosine between the normal and a microfacet's.
+pub const LEAST_HALF_Z: f64 = 1e-3;
+/// Area of a rectangle of light as slopes from which on it is no disc, over pi (1 + p^2), where it lies at p.
+pub const WIDE_OUTLINE: f64 = 0.01;
 
 /// A receiver that reflects: its vertices in the buffers of light.
 #[derive(Clone, Copy, Debug)]
@@ -74,9 +72,8 @@ pub fn macros(row: ShaderPermutation) -> ShaderPermutation {
         ("LEAST_ALPHA", brdf::LEAST_ALPHA),
         ("LEAST_ENERGY", LEAST_ENERGY),
         ("MOST_TILTED", MOST_TILTED),
-        ("MOST_SLOPES", MOST_SLOPES),
-        ("WIDENED", WIDENED),
-        ("WHOLE_LIGHT", WHOLE_LIGHT),
+        ("LEAST_HALF_Z", LEAST_HALF_Z),
+        ("WIDE_OUTLINE", WIDE_OUTLINE),
         ("TABLE", lobe::TABLE as f64),
         ("LEVELS", lobe::LEVELS as f64),
         ("MAP_SIDE", sky_map::SIDE as f64),

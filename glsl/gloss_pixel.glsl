@@ -17,6 +17,9 @@ layout(location = 10) centroid in vec4 shares;
 #if HIGHLIGHTS
 #include "highlight.glsl"
 #endif
+#if MIRRORED
+#include "mirror.glsl"
+#endif
 
 #if TEXTURED
 layout(binding = GLOSS_BINDING + 5) uniform sampler2D gloss_picture;  // green: roughness, blue: metal
@@ -92,10 +95,25 @@ vec3 glossy(uint index, vec3 base, vec3 light, vec4 share, vec2 uv, float within
     float energy = within * first.w;
 #if MIRROR
     // Vertices have the share of the sky that gets through, and the light that has bounced.
-    Reflection sky = reflect_sky(view, roughness);
     vec2 of_unit = reflected_share(view, roughness);
-    found = Reflection(found.facing * sky.facing + of_unit.x * found.grazing,
-        found.facing * sky.grazing + of_unit.y * found.grazing);
+    vec3 through = found.facing, nearby = found.grazing;
+#if MIRRORED
+    float mirrors = is_mirror(entity, n, from_eye);
+    if (mirrors > 0.0) {
+        vec3 tilt = view.normal - n;
+        vec4 mirrored = mirrored_light(entity, sqrt(view.alpha * view.alpha + dot(tilt, tilt)));
+        // Without a sky what is missing is blur past the end of what is drawn.
+        mirrored.rgb /= entity.sky_scale == 0.0 ? max(mirrored.a, 0.5) : 1.0;
+        through = mix(through, vec3((1.0 - mirrored.a) * entity.sky_scale), mirrors);
+        nearby = mix(nearby, mirrored.rgb, mirrors);
+    }
+#endif
+    found = Reflection(of_unit.x * nearby, of_unit.y * nearby);
+    if (through != vec3(0.0)) {
+        Reflection sky = reflect_sky(view, roughness);
+        found.facing += through * sky.facing;
+        found.grazing += through * sky.grazing;
+    }
     energy = of_unit.x + of_unit.y;
 #endif
 #if HIGHLIGHTS

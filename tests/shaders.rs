@@ -121,7 +121,11 @@ fn drawing() -> Vec<ShaderPermutation> {
     let ways = [None, Some(&sharp[0]), Some(&sharp[1])];
     let grids = [false, true].map(DrawGrid::rows).concat();
     let glossy = ways.into_iter().flat_map(|highlights| {
-        [Detail::Rough, Detail::Mirror, Detail::Textured].map(|detail| Look::Glossy { highlights, detail })
+        [Detail::Rough, Detail::Mirror, Detail::Textured].map(|detail| Look::Glossy {
+            highlights,
+            detail,
+            mirrors: true,
+        })
     });
     let looks: Vec<Look<'_>> = [Look::Plain, Look::Painted].into_iter().chain(glossy).collect();
     let triangles = looks.iter().flat_map(|&look| {

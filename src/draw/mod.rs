@@ -7,6 +7,7 @@
 
 pub mod camera;
 pub mod grid;
+pub mod mirror;
 pub mod pixel_light;
 pub mod show;
 pub mod smooth;
@@ -15,6 +16,7 @@ pub mod triangles;
 use crate::asset::grid::Grid;
 use crate::asset::mesh::Mesh;
 use crate::draw::grid::{DrawGrid, DrawnGrid};
+use crate::draw::mirror::Mirrors;
 use crate::draw::pixel_light::{ByPixel, LightImages, PixelLight, Receiver};
 use crate::draw::smooth::Smooth;
 use crate::draw::triangles::{Detail, DrawTriangles, DrawnLayer, DrawnSurface, DrawnTriangles};
@@ -28,7 +30,7 @@ use crate::shaders::{Library, ShaderPermutation};
 use crate::sharp::SharpPermutation;
 use ash::vk;
 use bytemuck::{Pod, Zeroable};
-use glam::{Mat4, Vec3};
+use glam::{Mat4, Vec3, Vec4};
 use std::collections::HashSet;
 use std::ops::Range;
 use std::sync::{Arc, OnceLock};
@@ -143,8 +145,8 @@ pub struct DrawnEntity<'d> {
     pub clip_from_object: Mat4,
     /// The ranges of the mesh's indices that are drawn.
     pub indices: Vec<Range<u32>>,
-    /// Whether back faces are culled, because they are never seen.
-    pub culls: bool,
+    /// The faces that are culled, because they are never seen.
+    pub culls: vk::CullModeFlags,
     /// The factor that turns the emission pattern into radiance, linear RGB.
     pub emission: Vec3,
     /// Byte offset of its vertices in the radiosity buffer.
@@ -200,10 +202,6 @@ impl EntityPush {
     }
 }
 
-fn culled(entity: &DrawnEntity<'_>) -> vk::CullModeFlags {
-    if entity.culls { vk::CullModeFlags::BACK } else { vk::CullModeFlags::NONE }
-}
-
 /// A region of the picture, and what is drawn there.
 pub struct DrawnViewport<'d> {
     /// Left, top, width and height in pixels.
@@ -226,6 +224,8 @@ pub struct PictureLights {
     pub pixels: Option<SharpPermutation>,
     /// For highlights, where the scene has such lights.
     pub highlights: Option<SharpPermutation>,
+    /// How many planes of the scene may be mirrors at a time.
+    pub mirrors: u32,
 }
 
 /// What pipelines are made of that draw into the same images.
@@ -275,6 +275,8 @@ pub struct Draw {
     light: Option<LightImages>,
     /// Pass "smooth", which follows where outlines are smoothed.
     pub smooth: Option<Smooth>,
+    /// Pass "mirror", which comes first where something may be a mirror.
+    pub mirrors: Option<Box<Mirrors>>,
 }
 
 impl Draw {
@@ -292,7 +294,7 @@ impl Draw {
         let maker = PipelineMaker { device: device.clone(), library: library.clone(), state };
         let light = |sharp| LightImages::new(device, library, [width, height], sharp);
         Ok(Draw {
-            triangles: DrawTriangles::new(maker.clone(), lights.highlights),
+            triangles: DrawTriangles::new(maker.clone(), lights.highlights, lights.mirrors > 0),
             grid: DrawGrid::new(maker),
             samples: (samples > 1)
                 .then(|| Image::new(device, "draw samples", ImageShape { samples, ..shape }))
@@ -303,6 +305,9 @@ impl Draw {
             is_made: false,
             light: lights.pixels.map(light).transpose()?,
             smooth: (antialias == Antialias::Outlines).then(|| Smooth::new(device, library, shape)).transpose()?,
+            mirrors: (lights.mirrors > 0)
+                .then(|| Mirrors::new(device, library, [width, height], lights.mirrors).map(Box::new))
+                .transpose()?,
         })
     }
 
@@ -318,9 +323,11 @@ impl Draw {
             let receivers: Vec<Receiver> = grids.then_some(Receiver::Grid).into_iter().chain(triangles).collect();
             self.light.as_ref().map_or(Ok(()), |light| light.make(&receivers))
         };
-        let (light, (triangles, grid)) =
-            rayon::join(light, || rayon::join(|| self.triangles.make(surfaces, by_pixel), grid));
-        light.and(triangles).and(grid)
+        let mirrors = || self.mirrors.as_ref().map_or(Ok(()), |mirrors| mirrors.make(surfaces, grids));
+        let triangles = || self.triangles.make(surfaces, by_pixel);
+        let ((light, mirrors), (triangles, grid)) =
+            rayon::join(|| rayon::join(light, mirrors), || rayon::join(triangles, grid));
+        light.and(mirrors).and(triangles).and(grid)
     }
 
     /// Device memory of a pixel in the images of [`Draw::new`], bytes; `by_pixel` where pixels evaluate sharp lights.
@@ -361,21 +368,22 @@ impl Draw {
         colors.chain([(&self.depth, Access::DepthWrite)])
     }
 
-    /// Draws all viewports, one after the other, over a background of one colour. Radiance above `white` is brought
+    /// Draws all viewports, one after the other, over a background of one colour and alpha. Radiance above `white` is brought
     /// down to it, hue kept. Between the render passes of a large picture stand barriers of the pass's own.
     pub fn record<'r>(
         &'r self,
         commands: &mut Commands<'r>,
         viewports: &[DrawnViewport<'r>],
-        background: Vec3,
+        background: Vec4,
         white: f32,
     ) -> Result<()> {
         // Its hue is kept, as that of surfaces is.
-        let brightest = background.max_element();
-        let background = if brightest > white { background * (white / brightest) } else { background };
+        let brightest = background.truncate().max_element();
+        let factor = if brightest > white { white / brightest } else { 1.0 };
+        let background = (factor * background.truncate()).extend(background.w);
         let target = Target {
             color: self.samples.as_ref().unwrap_or(&self.picture),
-            clear: Some(background.extend(1.0).to_array()),
+            clear: Some(background.to_array()),
             depth: Some(&self.depth),
             resolve: self.samples.as_ref().map(|_| &self.picture),
         };
@@ -398,13 +406,15 @@ impl Draw {
                     if bound.is_none_or(|bound| !std::ptr::eq(bound, entity)) {
                         drawing.area(viewport.area);
                         if let DrawnMesh::Triangles(mesh) = entity.mesh {
+                            let layer = DrawnLayer::Opaque { light };
                             self.triangles.bind(
                                 drawing,
                                 mesh,
                                 entity,
                                 viewport,
+                                self.mirrors.as_deref(),
                                 white,
-                                DrawnLayer::Opaque { light },
+                                layer,
                             )?;
                         }
                         bound = Some(entity);
@@ -438,7 +448,7 @@ impl Draw {
                 drawing.area(viewport.area);
                 // Of one entity the nearest place alone is seen, in whatever order its triangles come.
                 for layer in [DrawnLayer::Depth, DrawnLayer::Over] {
-                    self.triangles.bind(drawing, mesh, entity, viewport, white, layer)?;
+                    self.triangles.bind(drawing, mesh, entity, viewport, self.mirrors.as_deref(), white, layer)?;
                     entity.indices.iter().for_each(|range| drawing.indexed(range.clone()));
                 }
             }

@@ -12,7 +12,7 @@
 
 use crate::draw::grid::{self, BLOCK_CELLS};
 use crate::draw::triangles::DrawnTriangles;
-use crate::draw::{DEPTH, DrawnEntity, DrawnMesh, DrawnPaint, DrawnViewport, PipelineMaker, culled, made_once};
+use crate::draw::{DEPTH, DrawnEntity, DrawnMesh, DrawnPaint, DrawnViewport, PipelineMaker, made_once};
 use crate::error::Result;
 use crate::gpu::{
     Access, Bind, Buffer, Commands, Device, Drawing, GraphicsPipeline, GraphicsState, Image, ImageShape, Target,
@@ -309,7 +309,7 @@ impl LightImages {
             DrawnMesh::Triangles(mesh) => {
                 let mask = mask(entity, mesh);
                 drawing.bind(pipeline, &[], &mesh.indices);
-                drawing.cull(culled(entity));
+                drawing.cull(entity.culls);
                 let corners = (&mesh.indices, vk::Format::R32_UINT);
                 drawing.resources(&self.binds(viewport, light, corners, mask)?)?;
                 drawing.push(&TrianglePush {

@@ -1,8 +1,9 @@
 //! Part of pass "draw": meshes by their triangles.
 
 use crate::asset::mesh::Mesh;
+use crate::draw::mirror::{self, Mirrors};
 use crate::draw::pixel_light::{LIGHT_BINDING, shown_light, texels};
-use crate::draw::{DrawnEntity, DrawnPaint, DrawnViewport, EntityPush, PipelineMaker, culled, made_once};
+use crate::draw::{DrawnEntity, DrawnPaint, DrawnViewport, EntityPush, PipelineMaker, made_once};
 use crate::error::Result;
 use crate::gloss::{self, DrawnReflections};
 use crate::gpu::{Bind, Buffer, Device, Drawing, GraphicsPipeline, GraphicsState, Image, Keeps, TexelView};
@@ -109,7 +110,7 @@ pub enum Look<'p> {
     /// Textures or tints vary the reflectance.
     Painted,
     /// It may be painted, and reflects; highlights are of sharp lights that are evaluated so, if there are any.
-    Glossy { highlights: Option<&'p SharpPermutation>, detail: Detail },
+    Glossy { highlights: Option<&'p SharpPermutation>, detail: Detail, mirrors: bool },
 }
 
 /// What decides which pipelines draw a surface of triangles.
@@ -148,18 +149,24 @@ impl Look<'_> {
     /// The macros of both stages.
     fn macros(self, row: ShaderPermutation) -> ShaderPermutation {
         let row = row.define("PAINTED", !matches!(self, Look::Plain));
-        let Look::Glossy { highlights, detail } = self else { return row.define("GLOSS", false) };
+        let Look::Glossy { highlights, detail, mirrors } = self else { return row.define("GLOSS", false) };
         gloss::macros(row)
             .define("GLOSS", true)
             .define("GLOSS_BINDING", GLOSS_BINDING)
             .define("HIGHLIGHTS", highlights.is_some())
             .define("MIRROR", detail != Detail::Rough)
+            .define("MIRRORED", mirrors && detail != Detail::Rough)
+            .define("MIRROR_BINDING", MIRROR_BINDING)
+            .number("MIRROR_SPREAD", mirror::SPREAD)
+            .number("MIRROR_FLAT", mirror::FLAT)
             .define("TEXTURED", detail == Detail::Textured)
     }
 }
 
 /// First binding of reflections.
 const GLOSS_BINDING: u32 = 2;
+/// First binding of the picture of mirrors.
+const MIRROR_BINDING: u32 = LIGHT_BINDING + 1;
 
 /// What is drawn of an entity.
 #[derive(Clone, Copy)]
@@ -192,13 +199,15 @@ pub struct DrawTriangles {
     maker: PipelineMaker,
     /// How the sharp lights are evaluated that glossy surfaces have highlights of.
     highlights: Option<SharpPermutation>,
+    /// Whether any surface may be a mirror.
+    mirrors: bool,
     /// By look and form; each is made where it is first drawn with.
     made: [[OnceLock<GraphicsPipeline>; Form::COUNT]; Look::COUNT],
 }
 
 impl DrawTriangles {
-    pub fn new(maker: PipelineMaker, highlights: Option<SharpPermutation>) -> Self {
-        DrawTriangles { maker, highlights, made: Default::default() }
+    pub fn new(maker: PipelineMaker, highlights: Option<SharpPermutation>, mirrors: bool) -> Self {
+        DrawTriangles { maker, highlights, mirrors, made: Default::default() }
     }
 
     /// Makes what surfaces are drawn with, on all cores; `by_pixel` where pixels have light of their own.
@@ -243,7 +252,7 @@ impl DrawTriangles {
 
     fn look_of(&self, painted: bool, detail: Option<Detail>) -> Look<'_> {
         match detail {
-            Some(detail) => Look::Glossy { highlights: self.highlights.as_ref(), detail },
+            Some(detail) => Look::Glossy { highlights: self.highlights.as_ref(), detail, mirrors: self.mirrors },
             None if painted => Look::Painted,
             None => Look::Plain,
         }
@@ -275,6 +284,7 @@ impl DrawTriangles {
         mesh: &'r DrawnTriangles,
         entity: &DrawnEntity<'r>,
         viewport: &DrawnViewport<'r>,
+        mirrors: Option<&'r Mirrors>,
         white: f32,
         layer: DrawnLayer<'r>,
     ) -> Result<()> {
@@ -289,7 +299,7 @@ impl DrawTriangles {
             DrawnLayer::Opaque { light: None } => Form::Vertices,
         };
         drawing.bind(self.pipeline(look, form)?, &vertices, &mesh.indices);
-        drawing.cull(culled(entity));
+        drawing.cull(entity.culls);
         let mut binds = Vec::new();
         if let Some(paint) = paint {
             binds.push(Bind::Texture(paint.texture));
@@ -305,6 +315,10 @@ impl DrawTriangles {
         if let DrawnLayer::Opaque { light: Some(light) } = layer {
             binds.resize(LIGHT_BINDING as usize, Bind::None);
             binds.push(Bind::Image(light));
+        }
+        if let (Look::Glossy { .. }, Some(mirrors)) = (look, mirrors) {
+            binds.resize(MIRROR_BINDING as usize, Bind::None);
+            binds.extend(mirrors.binds());
         }
         drawing.resources(&binds)?;
         let push = EntityPush::new(entity, white);

@@ -94,7 +94,7 @@ impl Frame {
             return Ok(());
         }
         let sights = if self.options.skip.hidden { self.sights(placements, viewports) } else { None };
-        let Some(reflections) = &mut self.reflections else { return Ok(()) };
+        let Some(reflections) = &self.reflections else { return Ok(()) };
         let eye = self.scene.data.camera.eye;
         let mut entities = vec![GlossEntity::default(); placements.len()];
         for glossy in &reflections.glossy {
@@ -129,8 +129,11 @@ impl Frame {
                     entity.maps.normal_scale,
                     f32::from(u8::from(entity.maps.glow.is_some())),
                 ],
+                ..GlossEntity::default()
             };
         }
+        self.tell_mirrors(&mut entities);
+        let Some(reflections) = &mut self.reflections else { return Ok(()) };
         reflections.entities.write(&entities)?;
         let is_glossy: Vec<bool> = entities.iter().map(|entity| entity.vertex_count > 0).collect();
         let clusters = self.work.lists.clusters_of(&is_glossy, sights.as_deref());

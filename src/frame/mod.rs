@@ -11,6 +11,7 @@ mod change;
 mod draw_twin;
 mod gloss;
 mod memory;
+mod mirror;
 mod options;
 mod permutation;
 mod picture;
@@ -93,6 +94,8 @@ pub struct Frame {
     /// What passes light on within rigid groups, where it bounces.
     bounce: Option<Bounce>,
     reflections: Option<Reflections>,
+    /// Faces that may be mirrors.
+    mirror_faces: Vec<mirror::Face>,
     picture: FramePicture,
 }
 
@@ -179,7 +182,12 @@ impl Frame {
         let soft = sharp.is_some();
         let sharp =
             sharp.map(|fitting| SharpPermutation { edges: pixels.is_some(), lamps: linked.is_some(), ..fitting });
-        let picture = FramePicture::new(device, library, &options, PictureLights { pixels, highlights: sharp })?;
+        let mirror_faces = if reflections.is_some() { mirror::faces(&scene) } else { Vec::new() };
+        if !mirror_faces.is_empty() && !bounces {
+            radiosity.keep_dark()?;
+        }
+        let lights = PictureLights { pixels, highlights: sharp, mirrors: mirror::count(&mirror_faces) };
+        let picture = FramePicture::new(device, library, &options, lights)?;
         // Shaders take long to compile, so that this is done on all cores.
         let merging = || Merge::new(device, library, permutation);
         let lighting = || sharp.map(|permutation| Sharp::new(device, library, permutation)).transpose();
@@ -208,6 +216,7 @@ impl Frame {
             radiosity,
             picture,
             reflections,
+            mirror_faces,
             chains: None,
             bounce,
             buffers,

@@ -4,7 +4,7 @@ use super::memory::READBACK_PIXEL_BYTES;
 use super::permutation::pixel_shading;
 use super::record::PictureWork;
 use super::viewport::Viewport;
-use super::{Frame, Options, gloss};
+use super::{Frame, Options, gloss, mirror};
 use crate::asset::edges::Edges;
 use crate::draw::pixel_light::PixelLight;
 use crate::draw::smooth::Lines;
@@ -32,6 +32,8 @@ pub(super) struct FramePicture {
     pub lines: Lines,
     /// Its viewports, and which of the lines belong to each.
     pub prepared: Vec<(Viewport, Range<u32>)>,
+    /// The planes that mirror in it.
+    pub mirrors: Vec<mirror::Mirror>,
     /// Edges of each mesh, once a picture wants its outlines.
     pub edges: Vec<Edges>,
 }
@@ -46,6 +48,7 @@ impl FramePicture {
             readback: readback(device, options.size)?,
             lines: Lines::new(device)?,
             prepared: Vec::new(),
+            mirrors: Vec::new(),
             edges: Vec::new(),
         })
     }
@@ -89,6 +92,7 @@ impl Frame {
         PictureWork {
             draw: &self.picture.draw,
             viewports: self.picture.prepared.iter().map(viewport).collect(),
+            mirrored: self.mirrored(placements),
             background: self.sky.background,
             white,
             lines: &self.picture.lines,
@@ -115,7 +119,7 @@ impl Frame {
     fn draw(&self, options: &Options) -> Result<Draw> {
         let sharp = self.sharp.as_ref().map(|sharp| sharp.permutation);
         let pixels = pixel_shading(&self.device, options, &self.buffers, self.radiosity.soft(), sharp);
-        let lights = PictureLights { pixels, highlights: sharp };
+        let lights = PictureLights { pixels, highlights: sharp, mirrors: mirror::count(&self.mirror_faces) };
         Draw::new(&self.device, &self.library, options.size, options.antialias, lights)
     }
 

@@ -76,6 +76,7 @@ impl Frame {
     /// to be recorded next, or every cluster is merged again.
     pub fn prepare(&mut self, placements: &[Placement], viewports: &[Viewport], relight: Relight) -> Result<()> {
         // Light comes from what no viewport shows, too.
+        self.picture.mirrors = self.mirrors_of(placements, viewports);
         let relight = if relight == Relight::Seen && self.bounce.is_some() { Relight::Everything } else { relight };
         if relight != Relight::Nothing {
             self.fit_edges()?;
@@ -159,7 +160,10 @@ impl Frame {
     /// for others to read.
     pub(super) fn sights(&self, placements: &[Placement], viewports: &[Viewport]) -> Option<Vec<Vec<Sight>>> {
         let shown = viewports.iter().filter(|viewport| viewport.radiosity == RadiositySource::Merged);
-        let cameras: Vec<_> = shown.map(|viewport| self.camera([viewport.area[2], viewport.area[3]])).collect();
+        let mut cameras: Vec<_> = shown.map(|viewport| self.camera([viewport.area[2], viewport.area[3]])).collect();
+        if !cameras.is_empty() {
+            cameras.extend(self.picture.mirrors.iter().map(|mirror| mirror.camera));
+        }
         let of = |(index, placement)| cameras.iter().map(|camera| self.sight(camera, index, placement)).collect();
         (!cameras.is_empty()).then(|| placements.iter().enumerate().map(of).collect())
     }

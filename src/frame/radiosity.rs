@@ -1,7 +1,7 @@
 //! Radiosity of all vertices: what the merge writes, and what comes from elsewhere to be compared with it.
 
 use super::viewport::RadiositySource;
-use crate::bounce::BouncedLight;
+use crate::bounce::{BouncedLight, Bounces};
 use crate::error::Result;
 use crate::gpu::{Buffer, BufferKind, Device};
 use crate::scene::Scene;
@@ -16,6 +16,8 @@ pub(super) struct RadiosityBuffers {
     soft: Option<Buffer>,
     /// The same two before light has bounced, where it does: then the merge and the pass of sharp lights write these.
     direct: Option<Direct>,
+    /// Zeros, where mirrors show nothing but lamps.
+    dark: Option<Buffer>,
     /// The first byte of each entity.
     pub offsets: Vec<u64>,
     comparisons: [Option<Buffer>; 2],
@@ -43,6 +45,7 @@ impl RadiosityBuffers {
             merged: Buffer::zeros(device, "radiosity", size_bytes)?,
             soft: None,
             direct: None,
+            dark: None,
             offsets,
             comparisons: Default::default(),
         })
@@ -67,6 +70,21 @@ impl RadiosityBuffers {
                 .transpose()?,
         });
         Ok(())
+    }
+
+    /// Keeps zeros for what mirrors show where no light bounces.
+    pub fn keep_dark(&mut self) -> Result<()> {
+        self.dark = Some(Buffer::zeros(self.merged.device(), "dark radiosity", self.merged.size_bytes)?);
+        Ok(())
+    }
+
+    /// The light that mirrors show, with one bounce less than all.
+    pub fn mirrored(&self, bounces: Bounces) -> &Buffer {
+        match bounces {
+            Bounces::None => self.dark.as_ref().unwrap_or(&self.merged),
+            Bounces::One => self.direct(),
+            Bounces::All => &self.merged,
+        }
     }
 
     /// The bytes of an entity of so many vertices.

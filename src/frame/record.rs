@@ -31,6 +31,8 @@ pub struct MergeWork<'f> {
 pub struct PictureWork<'f> {
     pub(super) draw: &'f Draw,
     pub(super) viewports: Vec<DrawnViewport<'f>>,
+    /// What each mirror shows.
+    pub(super) mirrored: Vec<DrawnViewport<'f>>,
     pub(super) background: Vec3,
     pub(super) white: f32,
     pub(super) lines: &'f Lines,
@@ -99,14 +101,17 @@ pub fn record<'f>(
         commands.barrier(Access::ComputeWrite, Access::VertexRead);
         commands.barrier(Access::ComputeWrite, Access::GraphicsSampled);
     }
-    if let Some(PictureWork { draw, viewports, background, white, lines, .. }) = picture {
+    if let Some(PictureWork { draw, viewports, mirrored, background, white, lines, .. }) = picture {
+        if let Some(mirrors) = &draw.mirrors {
+            commands.pass("mirror", |c| mirrors.record(c, mirrored))?;
+        }
         for (image, access) in draw.attachments() {
             commands.image_barrier(image, None, access);
         }
         if let Some(light) = draw.pixel_light(viewports) {
             commands.pass("pixel light", |c| light.record(c, viewports))?;
         }
-        commands.pass("draw", |c| draw.record(c, viewports, *background, *white))?;
+        commands.pass("draw", |c| draw.record(c, viewports, background.extend(1.0), *white))?;
         if let Some(smooth) = &draw.smooth {
             // The pass copies the picture, and then reads picture and depth while it changes the copy.
             commands.barrier(Access::ColorWrite, Access::GraphicsSampled);

@@ -5,6 +5,7 @@ use crate::asset::edges::Line;
 use crate::draw::{DrawnEntity, DrawnPaint, camera, smooth};
 use crate::lists::sight::{self, Sight};
 use crate::scene::Placement;
+use ash::vk;
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
@@ -67,20 +68,28 @@ impl Frame {
         Sight::new(camera, world_from_object, device_mesh.radius_m, self.scene.meshes[mesh].is_solid())
     }
 
-    /// All entities in the order in which they are drawn, for a viewport of `size` pixels.
-    pub(super) fn drawn_entities(&self, placements: &[Placement], size: [u32; 2]) -> Vec<DrawnEntity<'_>> {
-        let camera = self.camera(size);
+    /// All entities in the order in which they are drawn for a camera.
+    pub(super) fn drawn_entities(&self, placements: &[Placement], camera: &sight::SightCamera) -> Vec<DrawnEntity<'_>> {
+        let [x, y, w] = [0, 1, 3].map(|row| camera.clip_from_world.row(row).truncate());
+        // A mirror turns triangles over.
+        let backs = match x.cross(y).dot(w) < 0.0 {
+            true => vk::CullModeFlags::FRONT,
+            false => vk::CullModeFlags::BACK,
+        };
         let drawn = placements.iter().enumerate().map(|(index, placement)| {
             let entity = &self.scene.entities[index];
             let device_mesh = &self.buffers.meshes[entity.mesh];
             let surface = self.buffers.surface(index);
             let world_from_object = camera::world_from_centred(placement, device_mesh.centre_m);
-            let sight = self.sight(&camera, index, placement);
+            let sight = self.sight(camera, index, placement);
             let drawn = DrawnEntity {
                 mesh: &surface.drawn,
                 indices: surface.drawn.seen(self.options.skip.hidden.then_some(&sight)),
                 clip_from_object: (camera.clip_from_world * world_from_object).as_mat4(),
-                culls: sight.culls() || self.scene.meshes[entity.mesh].is_two_sided(),
+                culls: match sight.culls() || self.scene.meshes[entity.mesh].is_two_sided() {
+                    true => backs,
+                    false => vk::CullModeFlags::NONE,
+                },
                 emission: entity.emission,
                 radiosity_offset: self.radiosity.offsets[index],
                 tag: if entity.transparent { self.scene.opacity(index) } else { smooth::tag(index) },
@@ -127,7 +136,7 @@ impl Frame {
 
     /// Entities in the order in which a viewport draws them, without emission and paint where it shows none.
     pub(super) fn drawn_in(&self, placements: &[Placement], viewport: &Viewport) -> Vec<DrawnEntity<'_>> {
-        let mut drawn = self.drawn_entities(placements, [viewport.area[2], viewport.area[3]]);
+        let mut drawn = self.drawn_entities(placements, &self.camera([viewport.area[2], viewport.area[3]]));
         if !viewport.adds_emission {
             for entity in &mut drawn {
                 entity.emission = Vec3::ZERO;

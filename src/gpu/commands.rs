@@ -11,6 +11,7 @@ use super::flight::{Flight, MAX_PASSES, Recording, Signals, Timing};
 use super::image::Image;
 use super::memory::{Buffer, BufferKind};
 use super::pipeline::ComputePipeline;
+use super::texture::Texture;
 use crate::error::{Error, Result};
 use ash::vk;
 use bytemuck::Pod;
@@ -272,6 +273,56 @@ impl<'r> Commands<'r> {
         let (handle, buffer) = self.raw();
         // SAFETY: both are borrowed until the commands have run; the layouts are those of the accesses (tracked).
         unsafe { handle.cmd_copy_image(buffer, from.raw(), read, to.raw(), write, &[region]) };
+    }
+
+    /// Fills all levels of a texture, each with the one before at half its size, from an image of its own size. The image
+    /// was made the source of a copy; the texture loses its content and is ready to be sampled.
+    pub fn fill_levels(&mut self, from: &'r Image, texture: &'r Texture) {
+        let to = texture.image();
+        self.image_barrier(to, None, Access::TransferWrite);
+        let pass = self.pass_name();
+        self.tracker.use_image(from.id, &from.name, Access::TransferRead, &pass);
+        self.tracker.use_image(to.id, &to.name, Access::TransferWrite, &pass);
+        let [read, write] = [Access::TransferRead, Access::TransferWrite].map(Access::layout);
+        let (handle, buffer) = self.raw();
+        let layers = packed(to).image_subresource;
+        let corner = |level: u32| {
+            let [width, height] = [to.shape.width, to.shape.height].map(|size| (size >> level).max(1).cast_signed());
+            [vk::Offset3D::default(), vk::Offset3D { x: width, y: height, z: 1 }]
+        };
+        let turn = |level: u32, from: vk::ImageLayout, to_layout: vk::ImageLayout| {
+            let range = vk::ImageSubresourceRange { base_mip_level: level, level_count: 1, ..to.whole() };
+            let barriers = [vk::ImageMemoryBarrier2::default()
+                .image(to.raw())
+                .subresource_range(range)
+                .old_layout(from)
+                .new_layout(to_layout)
+                .src_stage_mask(vk::PipelineStageFlags2::ALL_TRANSFER)
+                .src_access_mask(vk::AccessFlags2::TRANSFER_WRITE)
+                .dst_stage_mask(vk::PipelineStageFlags2::ALL_TRANSFER)
+                .dst_access_mask(vk::AccessFlags2::TRANSFER_READ)];
+            // SAFETY: the command buffer is recording and outside a render pass; the image is borrowed until it has run.
+            unsafe {
+                handle.cmd_pipeline_barrier2(buffer, &vk::DependencyInfo::default().image_memory_barriers(&barriers));
+            }
+        };
+        let extent = vk::Extent3D { width: to.shape.width, height: to.shape.height, depth: 1 };
+        let first = [vk::ImageCopy::default().src_subresource(layers).dst_subresource(layers).extent(extent)];
+        // SAFETY: both are borrowed until the commands have run, and the layouts are those stated above.
+        unsafe { handle.cmd_copy_image(buffer, from.raw(), read, to.raw(), write, &first) };
+        for level in 1..to.levels() {
+            turn(level - 1, write, read);
+            let region = [vk::ImageBlit::default()
+                .src_subresource(vk::ImageSubresourceLayers { mip_level: level - 1, ..layers })
+                .src_offsets(corner(level - 1))
+                .dst_subresource(vk::ImageSubresourceLayers { mip_level: level, ..layers })
+                .dst_offsets(corner(level))];
+            // SAFETY: as above.
+            unsafe { handle.cmd_blit_image(buffer, to.raw(), read, to.raw(), write, &region, vk::Filter::LINEAR) };
+        }
+        // All levels have one layout again.
+        (0..to.levels() - 1).for_each(|level| turn(level, read, write));
+        self.image_barrier(to, Some(Access::TransferWrite), Access::GraphicsSampled);
     }
 
     /// Ends the recording, submits it and waits. Returns the duration of each pass, in order.

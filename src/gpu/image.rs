@@ -133,6 +133,10 @@ impl Image {
         self.view.handle
     }
 
+    pub(super) fn levels(&self) -> u32 {
+        self.levels
+    }
+
     /// All levels of its one layer.
     pub(super) fn whole(&self) -> vk::ImageSubresourceRange {
         whole(self.shape.format, self.levels)

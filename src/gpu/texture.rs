@@ -19,14 +19,14 @@ pub struct Level<'t> {
     pub bytes: &'t [u8],
 }
 
-/// A picture that shaders sample, bilinear and of the nearest level.
+/// A picture that shaders sample, bilinear.
 pub struct Texture {
     sampler: Owned<vk::Sampler>,
     image: Image,
 }
 
 impl Texture {
-    /// Uploads the levels, each half as large as the one before, rounded down. `wrap` says how it goes on along u and v.
+    /// Uploads the levels, of which the nearest is sampled, each half as large as the one before, rounded down. `wrap` says how it goes on along u and v.
     pub fn new(
         device: &Arc<Device>,
         name: &str,
@@ -36,21 +36,40 @@ impl Texture {
     ) -> Result<Self> {
         let [first, ..] = levels else { unreachable!("a texture has a level") };
         let shape = ImageShape { format, width: first.width, height: first.height, samples: 1 };
-        let usage = vk::ImageUsageFlags::SAMPLED | vk::ImageUsageFlags::TRANSFER_DST;
-        let image = Image::with_levels(device, name, shape, levels.len() as u32, usage)?;
+        let mipmaps = vk::SamplerMipmapMode::NEAREST;
+        let texture = Self::empty(device, name, shape, levels.len() as u32, wrap, mipmaps)?;
+        texture.fill(device, name, levels)?;
+        Ok(texture)
+    }
+
+    /// A texture that a pass fills ([`Commands::fill_levels`]), bilinear and between two levels.
+    pub fn filled_by_passes(device: &Arc<Device>, name: &str, shape: ImageShape, levels: u32) -> Result<Self> {
+        let edge = [vk::SamplerAddressMode::CLAMP_TO_EDGE; 2];
+        Self::empty(device, name, shape, levels, edge, vk::SamplerMipmapMode::LINEAR)
+    }
+
+    fn empty(
+        device: &Arc<Device>,
+        name: &str,
+        shape: ImageShape,
+        levels: u32,
+        wrap: [vk::SamplerAddressMode; 2],
+        mipmaps: vk::SamplerMipmapMode,
+    ) -> Result<Self> {
+        use vk::ImageUsageFlags as Use;
+        let usage = Use::SAMPLED | Use::TRANSFER_DST | Use::TRANSFER_SRC;
+        let image = Image::with_levels(device, name, shape, levels, usage)?;
         let sampler = vk::SamplerCreateInfo::default()
             .mag_filter(vk::Filter::LINEAR)
             .min_filter(vk::Filter::LINEAR)
-            .mipmap_mode(vk::SamplerMipmapMode::NEAREST)
+            .mipmap_mode(mipmaps)
             .address_mode_u(wrap[0])
             .address_mode_v(wrap[1])
             .max_lod(vk::LOD_CLAMP_NONE);
         // SAFETY: destroyed by `Owned`.
         let sampler = unsafe { device.handle.create_sampler(&sampler, None) }.checked("vkCreateSampler", name)?;
         let sampler = Owned::new(device, name, sampler, ash::Device::destroy_sampler);
-        let texture = Texture { sampler, image };
-        texture.fill(device, name, levels)?;
-        Ok(texture)
+        Ok(Texture { sampler, image })
     }
 
     /// Copies the levels and leaves the image ready to be sampled.
@@ -72,6 +91,10 @@ impl Texture {
         commands.copy_regions(&staging, &self.image, &regions);
         commands.image_barrier(&self.image, Some(Access::TransferWrite), Access::GraphicsSampled);
         commands.submit().map(|_| ())
+    }
+
+    pub fn image(&self) -> &Image {
+        &self.image
     }
 
     pub(super) fn descriptor(&self) -> vk::DescriptorImageInfo {

@@ -113,7 +113,7 @@ fn highlights_are_those_of_rays() {
     ];
     let mut lines = Vec::new();
     for (name, light) in &lights {
-        for (roughness, most) in [(0.3, 0.06), (0.5, 0.04), (0.7, 0.045), (1.0, 0.045)] {
+        for (roughness, most) in [(0.2, 0.065), (0.3, 0.065), (0.5, 0.04), (0.7, 0.045), (1.0, 0.045)] {
             let scene = ball(&format!("roughness = {roughness:.1}, metallic = 1"), light);
             let found = error(&picture(&gpu, &scene, options()), &by_rays(&scene, 256).linear);
             lines.push(format!("{name} {roughness}: {found:.4}"));
@@ -165,9 +165,37 @@ fn near_things_are_reflected_where_they_stand() {
     let wanted = by_bouncing_rays(&scene, 256, 1);
     let floor = 3 * (SIZE[0] * SIZE[1] / 2) as usize..;
     let error = error(&found[floor.clone()], &wanted.linear[floor]);
-    println!("{error:.4}");
-    // Without their places 0.38.
-    assert!(error < 0.3, "{error}");
+    report(&format!("{error:.4}"));
+    // 0.26 where its vertices look along their links, 0.38 by the mean of these.
+    assert!(error < 0.2, "{error}");
+}
+
+/// A polished floor and a polished wall show a ball that moves, each at its place, and no lamp twice.
+#[test]
+fn flat_surfaces_mirror_what_moves() {
+    let Some(gpu) = gpu() else { return };
+    let scene = scene(
+        r#"
+        mesh = [
+            { name = "floor", plane = { size_m = 4, cells = 24 } },
+            { name = "wall", cuboid = { size_m = [4, 2, 0.1], cells = 12 } },
+            { name = "ball", sphere = { radius_m = 0.3, subdivisions = 3 } },
+            { name = "lamp", sphere = { radius_m = 0.2, subdivisions = 2 } },
+        ]
+        entity = [
+            { mesh = "floor", albedo = [0.6, 0.6, 0.6], gloss = { roughness = 0.05, metallic = 1 } },
+            { mesh = "wall", position = [0, 1, -1.5], albedo = [0.8, 0.7, 0.6], gloss = { roughness = 0.1, metallic = 1 } },
+            { mesh = "ball", position = [0.4, 0.5, -0.3], albedo = [0.9, 0.3, 0.1], motion = [{ orbit = { centre = [0, 0.5, -0.3], axis = [0, 1, 0], period_s = 4 } }] },
+            { mesh = "lamp", position = [-0.8, 1.6, 1.2], emission = [20, 20, 20], receives = false },
+        ]
+        "#,
+    );
+    let bake = bake::Options { groups: true, ..bake::Options::default() };
+    let found = picture(&gpu, &scene, frame::Options { bounces: Bounces::One, bake, ..options() });
+    let wanted = by_bouncing_rays(&scene, 256, 1);
+    let error = error(&found, &wanted.linear);
+    report(&format!("{error:.4}"));
+    assert!(error < 0.15, "{error}");
 }
 
 /// The eye changes what is reflected, and nothing is merged for it.

@@ -60,6 +60,9 @@ fn glossy_entities() {
             textured,
             factors,
             glow,
+            mirror_plane,
+            mirror_place,
+            mirror_view,
         }
     );
     assert_eq!(reflection.strides.get("GlossEntity"), Some(&(size_of::<GlossEntity>() as u32)));

@@ -1,0 +1,102 @@
+//! Pass "mirror": what flat glossy surfaces mirror.
+//!
+//! For each plane that mirrors, the scene is drawn as the eye's mirror image sees it, by the light of vertices, into a
+//! part of one picture, at half the size on software devices. A pixel of the plane finds there what it mirrors at its own place, blurred by
+//! the lobe and by how far behind the mirror that is: levels of detail of the picture are the blur. Where the picture is
+//! empty the sky is mirrored.
+
+use crate::draw::triangles::DrawnSurface;
+use crate::draw::{Antialias, Draw, DrawnViewport, PictureLights};
+use crate::error::Result;
+use crate::gpu::{Access, Bind, Commands, Device, GraphicsPipeline, GraphicsState, Image, ImageShape, Target, Texture};
+use crate::shaders::{Library, ShaderPermutation};
+use ash::vk;
+use glam::Vec4;
+use std::collections::HashSet;
+use std::sync::Arc;
+
+/// Levels of detail: the coarsest texels are 32 of the finest wide.
+pub const LEVELS: u32 = 6;
+/// Radius, in slopes of the microfacets times the distance, that a lobe is blurred by.
+pub const SPREAD: f64 = 1.6;
+/// Least cosine of the angle between a pixel's normal and the plane's.
+pub const FLAT: f64 = 0.999;
+
+pub struct Mirrors {
+    draw: Draw,
+    /// What depth leaves of 1.
+    far: Image,
+    to_far: GraphicsPipeline,
+    /// Levels of detail of the picture, and of that.
+    levels: [Texture; 2],
+    /// Width and height of a mirror's part in texels.
+    pub part: [u32; 2],
+}
+
+impl Mirrors {
+    /// For pictures of `width` x `height` in which at most `count` planes are mirrors.
+    pub fn new(device: &Arc<Device>, library: &Library, size: [u32; 2], count: u32) -> Result<Self> {
+        // Texels of the coarsest level belong to one mirror each.
+        let coarsest = 1 << (LEVELS - 1);
+        let most = device.most_image_px() / count / coarsest * coarsest;
+        let texel_px = if device.info.is_software() { 2 } else { 1 };
+        let part = size.map(|pixels| pixels.div_ceil(texel_px).next_multiple_of(coarsest).min(most));
+        let lights = PictureLights { pixels: None, highlights: None, mirrors: 0 };
+        let draw = Draw::new(device, library, [count * part[0], part[1]], Antialias::None, lights)?;
+        let shape = draw.picture.shape;
+        let of_far = ImageShape { format: vk::Format::R16_SFLOAT, ..shape };
+        let [vertex, fragment] = ["show.vert", "mirror_far.frag"].map(|file| ShaderPermutation::new(file, 4));
+        let [vertex, fragment] = [library.shader(&vertex)?, library.shader(&fragment)?];
+        let state = GraphicsState::plain(of_far.format);
+        Ok(Mirrors {
+            far: Image::new(device, "mirror far", of_far)?,
+            to_far: GraphicsPipeline::new(device, "mirror far", &vertex, &fragment, state)?,
+            levels: [
+                Texture::filled_by_passes(device, "mirror levels", shape, LEVELS)?,
+                Texture::filled_by_passes(device, "mirror far levels", of_far, LEVELS)?,
+            ],
+            draw,
+            part,
+        })
+    }
+
+    /// How many planes may be mirrors.
+    pub fn count(&self) -> usize {
+        (self.draw.picture.shape.width / self.part[0]) as usize
+    }
+
+    /// Left, top, width and height of a mirror's part.
+    pub fn area(&self, mirror: usize) -> [u32; 4] {
+        let [width, height] = self.part;
+        [mirror as u32 * width, 0, width, height]
+    }
+
+    pub(super) fn make(&self, surfaces: &HashSet<DrawnSurface>, grids: bool) -> Result<()> {
+        let diffuse = surfaces.iter().map(|surface| DrawnSurface { detail: None, ..*surface }).collect();
+        self.draw.make(&diffuse, grids)
+    }
+
+    /// Draws what the mirrors show, one viewport each, and makes it ready to be sampled.
+    pub fn record<'r>(&'r self, commands: &mut Commands<'r>, viewports: &[DrawnViewport<'r>]) -> Result<()> {
+        for (image, access) in self.draw.attachments() {
+            commands.image_barrier(image, None, access);
+        }
+        self.draw.record(commands, viewports, Vec4::ZERO, f32::INFINITY)?;
+        commands.image_barrier(&self.draw.depth, Some(Access::DepthWrite), Access::GraphicsSampled);
+        commands.image_barrier(&self.far, None, Access::ColorWrite);
+        let target = Target { color: &self.far, clear: None, depth: None, resolve: None };
+        commands.render(&target, |drawing| {
+            drawing.area([0, 0, self.far.shape.width, self.far.shape.height]);
+            drawing.screen(&self.to_far, &[Bind::Image(&self.draw.depth)], &())
+        })?;
+        for (image, levels) in [&self.draw.picture, &self.far].into_iter().zip(&self.levels) {
+            commands.image_barrier(image, Some(Access::ColorWrite), Access::TransferRead);
+            commands.fill_levels(image, levels);
+        }
+        Ok(())
+    }
+
+    pub(super) fn binds(&self) -> [Bind<'_>; 2] {
+        self.levels.each_ref().map(Bind::Texture)
+    }
+}

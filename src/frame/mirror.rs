@@ -1,0 +1,320 @@
+//! Planes that mirror: flat faces of glossy entities, the ones that a picture shows best, and the eye's mirror image
+//! behind each.
+
+use super::viewport::Viewport;
+use super::{Frame, gloss};
+use crate::asset::mesh::Mesh;
+use crate::draw::triangles::Detail;
+use crate::draw::{DrawnViewport, camera};
+use crate::gloss::{PIXEL_ROUGHNESS, brdf};
+use crate::layout::GlossEntity;
+use crate::lists::sight::SightCamera;
+use crate::scene::{Placement, Scene};
+use glam::{DMat4, DVec2, DVec3, DVec4, Vec3};
+use std::collections::HashMap;
+
+/// The most planes that are mirrors at a time.
+const MOST: usize = 4;
+/// Least share of a picture's light that a mirror reflects: of the pixels, times the reflectance.
+const LEAST_SHARE: f64 = 5e-4;
+/// Least share of a mesh's surface in a face that may be a mirror, and how many faces of a mesh may be.
+const LEAST_FACE: f64 = 0.04;
+const MOST_FACES: usize = 8;
+/// Faces whose normals and offsets, in their distance from the eye, differ by less are one mirror.
+const SAME_PLANE: f64 = 1e-3;
+
+/// A flat face of a glossy entity.
+pub(super) struct Face {
+    entity: usize,
+    /// Corners of a rectangle around it in the mesh's frame.
+    corners: [DVec3; 4],
+    normal: DVec3,
+}
+
+/// A plane that mirrors in the next picture.
+pub(super) struct Mirror {
+    pub camera: SightCamera,
+    /// Unit normal on the eye's side, and offset from the world's origin.
+    plane: DVec4,
+    entities: Vec<usize>,
+    /// Share of its picture in what it reflects: less than 1 for one that is hardly seen.
+    share: f64,
+    /// Distance of the eye from the plane, metres.
+    height_m: f64,
+    /// What a step away from the plane takes from depth, over the view depth.
+    depth_step: f64,
+}
+
+/// The faces of a scene that may be mirrors.
+pub(super) fn faces(scene: &Scene) -> Vec<Face> {
+    let glossy = scene.entities.iter().enumerate().filter(|(_, entity)| {
+        let mirrors = matches!(gloss::detail(entity), Some(Detail::Mirror | Detail::Textured));
+        mirrors && !entity.transparent && entity.gloss.is_some_and(|gloss| gloss.roughness < PIXEL_ROUGHNESS)
+    });
+    let mut of_mesh: HashMap<usize, Vec<([DVec3; 4], DVec3)>> = HashMap::new();
+    let mut out = Vec::new();
+    for (entity, of) in glossy {
+        let flat = of_mesh.entry(of.mesh).or_insert_with(|| flat_faces(&scene.meshes[of.mesh]));
+        out.extend(flat.iter().map(|(corners, normal)| Face { entity, corners: *corners, normal: *normal }));
+    }
+    out
+}
+
+/// Rectangles around the largest flat faces of a mesh, and their normals.
+fn flat_faces(mesh: &Mesh) -> Vec<([DVec3; 4], DVec3)> {
+    let (centre, radius_m) = mesh.bounding_sphere();
+    let mut planes: HashMap<[i32; 4], (f64, DVec3, Vec<DVec3>)> = HashMap::new();
+    for triangle in &mesh.triangles {
+        let [a, b, c] = triangle.map(|v| mesh.positions[v as usize].as_dvec3());
+        let twice = (b - a).cross(c - a);
+        let Some(normal) = twice.try_normalize() else { continue };
+        let offset = normal.dot(a - centre.as_dvec3()) / f64::from(radius_m);
+        let key = (normal.extend(offset) * 1024.0).round().as_ivec4().to_array();
+        let (area_m2, _, corners) = planes.entry(key).or_insert((0.0, normal, Vec::new()));
+        *area_m2 += 0.5 * twice.length();
+        corners.extend([a, b, c]);
+    }
+    let least = LEAST_FACE * mesh.area_m2();
+    let mut planes: Vec<_> = planes.into_iter().filter(|(_, (area_m2, ..))| *area_m2 > least).collect();
+    planes.sort_by(|(a_key, (a, ..)), (b_key, (b, ..))| b.total_cmp(a).then(a_key.cmp(b_key)));
+    let rectangle = |(_, (_, normal, corners)): ([i32; 4], (f64, DVec3, Vec<DVec3>))| {
+        let (x, y) = normal.any_orthonormal_pair();
+        let flat: Vec<DVec2> = corners.iter().map(|corner| DVec2::new(x.dot(*corner), y.dot(*corner))).collect();
+        let low = flat.iter().copied().fold(DVec2::INFINITY, DVec2::min);
+        let high = flat.iter().copied().fold(DVec2::NEG_INFINITY, DVec2::max);
+        let height = normal.dot(corners[0]);
+        let at = |u: f64, v: f64| u * x + v * y + height * normal;
+        ([at(low.x, low.y), at(high.x, low.y), at(high.x, high.y), at(low.x, high.y)], normal)
+    };
+    planes.into_iter().take(MOST_FACES).map(rectangle).collect()
+}
+
+/// The share of a picture that a polygon covers.
+fn share_of_picture(clip_from_world: DMat4, corners: [DVec3; 4]) -> f64 {
+    let mut polygon: Vec<DVec4> = corners.iter().map(|corner| clip_from_world * corner.extend(1.0)).collect();
+    // Within the picture's sides, and in front of the eye.
+    let inside: [fn(&DVec4) -> f64; 5] = [|p| p.w - p.x, |p| p.w + p.x, |p| p.w - p.y, |p| p.w + p.y, |p| p.w - 1e-6];
+    for side in inside {
+        let mut kept = Vec::with_capacity(polygon.len() + 1);
+        for (a, b) in polygon.iter().zip(polygon.iter().cycle().skip(1)) {
+            let [from, to] = [side(a), side(b)];
+            if from >= 0.0 {
+                kept.push(*a);
+            }
+            if (from >= 0.0) != (to >= 0.0) {
+                kept.push(a.lerp(*b, from / (from - to)));
+            }
+        }
+        polygon = kept;
+    }
+    let flat: Vec<DVec2> = polygon.iter().map(|p| p.truncate().truncate() / p.w).collect();
+    let twice: f64 = flat.iter().zip(flat.iter().cycle().skip(1)).map(|(a, b)| a.perp_dot(*b)).sum();
+    twice.abs() / 8.0
+}
+
+/// The matrix of a reflection at a plane.
+fn reflection(plane: DVec4) -> DMat4 {
+    let normal = plane.truncate();
+    let column = |axis: DVec3| (axis - 2.0 * normal.dot(axis) * normal).extend(0.0);
+    DMat4::from_cols(column(DVec3::X), column(DVec3::Y), column(DVec3::Z), (-2.0 * plane.w * normal).extend(1.0))
+}
+
+impl Mirror {
+    /// The mirror of a plane as a camera sees it; `part` is the size of its picture in pixels.
+    fn new(seen: &SightCamera, plane: DVec4, part: [u32; 2]) -> Self {
+        let height_m = plane.dot(seen.eye.extend(1.0));
+        let eye = seen.eye - 2.0 * height_m * plane.truncate();
+        let mut clip = (seen.clip_from_world * reflection(plane)).transpose();
+        // From the mirrored eye, the steepest way to the plane that the picture has, for a step of 1 in view depth.
+        let to_world = seen.clip_from_world.inverse();
+        let steepness = |x: f64, y: f64| {
+            let near = to_world * DVec4::new(x, y, 1.0, 1.0);
+            let toward = near.truncate() / near.w - seen.eye;
+            -plane.truncate().dot(toward) / (seen.clip_from_world * toward.extend(0.0)).w
+        };
+        let corners = [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)];
+        let steepest = corners.into_iter().map(|(x, y)| steepness(x, y)).fold(1e-3, f64::max);
+        // Depth is 1 on the plane and falls with the distance from it over the view depth: what lies behind the plane
+        // is clipped. The plane itself is not drawn.
+        let depth_step = 1.0 / steepest;
+        let above = plane - DVec4::W * (1e-4 * height_m);
+        clip.z_axis = clip.w_axis - depth_step * above;
+        let camera =
+            SightCamera { clip_from_world: clip.transpose(), eye, near_m: seen.near_m, size: part, samples: false };
+        Mirror { camera, plane, entities: Vec::new(), share: 0.0, height_m, depth_step }
+    }
+}
+
+impl Frame {
+    /// The planes that mirror in a picture of these viewports: none where it has several.
+    pub(super) fn mirrors_of(&self, placements: &[Placement], viewports: &[Viewport]) -> Vec<Mirror> {
+        let ([viewport], Some(mirrors)) = (viewports, &self.picture.draw.mirrors) else { return Vec::new() };
+        if !viewport.shows_light() || self.reflections.is_none() {
+            return Vec::new();
+        }
+        let seen = self.camera([viewport.area[2], viewport.area[3]]);
+        let mut found: Vec<(Mirror, f64)> = Vec::new();
+        for face in &self.mirror_faces {
+            let placement = &placements[face.entity];
+            let corners = face.corners.map(|corner| placement.point(corner));
+            let normal = placement.turn() * face.normal;
+            let plane = normal.extend(-normal.dot(corners[0]));
+            let height_m = plane.dot(seen.eye.extend(1.0));
+            let middle = corners.iter().sum::<DVec3>() / 4.0;
+            let distance_m = middle.distance(seen.eye);
+            if height_m < 1e-3 * distance_m {
+                continue;
+            }
+            let entity = &self.scene.entities[face.entity];
+            let Some(of) = entity.gloss else { continue };
+            let f0 = brdf::facing(&of, entity.albedo.as_dvec3()).element_sum() / 3.0;
+            let reflectance = f0 + (1.0 - f0) * brdf::grazing(height_m / distance_m);
+            let score = reflectance * share_of_picture(seen.clip_from_world, corners);
+            let same = |(mirror, _): &&mut (Mirror, f64)| {
+                let off = mirror.plane.dot(middle.extend(1.0)).abs();
+                (mirror.plane - plane).truncate().length() < SAME_PLANE && off < SAME_PLANE * distance_m
+            };
+            match found.iter_mut().find(same) {
+                Some((mirror, sum)) => {
+                    *sum += score;
+                    mirror.entities.push(face.entity);
+                }
+                None if score > 0.0 => {
+                    let mirror = Mirror::new(&seen, plane, mirrors.part);
+                    found.push((Mirror { entities: vec![face.entity], ..mirror }, score));
+                }
+                None => {}
+            }
+        }
+        found.sort_by(|(_, a), (_, b)| b.total_cmp(a));
+        // None comes or goes in a step.
+        let least = found.get(mirrors.count()).map_or(0.0, |(_, score)| *score).max(LEAST_SHARE);
+        let shown = found.into_iter().filter(|(_, score)| *score > least).take(mirrors.count());
+        shown.map(|(mirror, score)| Mirror { share: (score / least - 1.0).min(1.0), ..mirror }).collect()
+    }
+
+    /// What each mirror of the picture that was prepared last shows.
+    pub(super) fn mirrored(&self, placements: &[Placement]) -> Vec<DrawnViewport<'_>> {
+        let (Some(mirrors), Some(reflections)) = (&self.picture.draw.mirrors, &self.reflections) else {
+            return Vec::new();
+        };
+        let shown = |(number, mirror): (usize, &Mirror)| {
+            let mut entities = self.drawn_entities(placements, &mirror.camera);
+            // Highlights stand for the lamps that have them.
+            let highlights = |entity: usize| {
+                let of = |glossy: &&crate::gloss::Glossy| mirror.entities.contains(&glossy.entity);
+                reflections.glossy.iter().filter(of).any(|glossy| glossy.lights.contains(&(entity as u32)))
+            };
+            for entity in &mut entities {
+                entity.tag = if entity.transparent { entity.tag } else { 1.0 };
+                entity.gloss = None;
+                if highlights(entity.index as usize) {
+                    entity.emission = Vec3::ZERO;
+                }
+            }
+            DrawnViewport {
+                area: mirrors.area(number),
+                entities,
+                radiosity: self.radiosity.mirrored(self.options.bounces),
+                gloss: None,
+                pixel: None,
+                lines: 0..0,
+            }
+        };
+        self.picture.mirrors.iter().enumerate().map(shown).collect()
+    }
+
+    /// Tells the glossy entities which mirrors they are.
+    pub(super) fn tell_mirrors(&self, entities: &mut [GlossEntity]) {
+        let Some(of_picture) = &self.picture.draw.mirrors else { return };
+        let camera = &self.scene.data.camera;
+        let eye = camera.eye.as_dvec3();
+        let [width, height] = self.options.size.map(f64::from);
+        for (number, mirror) in self.picture.mirrors.iter().enumerate() {
+            let [left, _, part_width, part_height] = of_picture.area(number).map(f64::from);
+            let across = part_width * of_picture.count() as f64;
+            let focal_px = 0.5 * part_height / camera::half_height(camera);
+            let plane = mirror.plane.truncate().extend(mirror.plane.dot(eye.extend(1.0)));
+            for &entity in &mirror.entities {
+                entities[entity].mirror_plane = plane.as_vec4().to_array();
+                entities[entity].mirror_place =
+                    [part_width / across / width, 1.0 / height, left / across, mirror.share].map(|x| x as f32);
+                let behind = 1.0 / (mirror.depth_step * mirror.height_m);
+                entities[entity].mirror_view = [left, left + part_width, focal_px, behind].map(|x| x as f32);
+            }
+        }
+    }
+}
+
+/// How many planes of a scene may be mirrors at a time.
+pub(super) fn count(faces: &[Face]) -> u32 {
+    faces.len().min(MOST) as u32
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::asset::generate::{cuboid, sphere};
+    use crate::scene::Camera;
+
+    fn seen() -> SightCamera {
+        let camera = Camera { eye: Vec3::new(0.3, 1.2, 3.0), target: Vec3::new(0.0, 0.4, 0.0), fov_deg: 40.0 };
+        SightCamera {
+            clip_from_world: camera::clip_from_world(&camera, 1.5),
+            eye: camera.eye.as_dvec3(),
+            near_m: camera::near_corner_m(&camera, 1.5),
+            size: [96, 64],
+            samples: false,
+        }
+    }
+
+    /// What stands on a floor is seen where its mirror image is, nearer things have more depth, and what lies below the
+    /// floor is clipped.
+    #[test]
+    fn the_mirrored_camera_sees_what_the_eye_sees_in_the_floor() {
+        let seen = seen();
+        let mirror = Mirror::new(&seen, DVec4::Y, [64, 64]);
+        let through = |p: DVec3| mirror.camera.clip_from_world * p.extend(1.0);
+        for point in [DVec3::new(0.2, 0.3, -0.5), DVec3::new(-0.4, 0.8, -3.0), DVec3::new(0.0, 2.0, -40.0)] {
+            let clip = through(point);
+            let image = seen.clip_from_world * (point * DVec3::new(1.0, -1.0, 1.0)).extend(1.0);
+            assert!((clip.truncate().truncate() / clip.w - image.truncate().truncate() / image.w).length() < 1e-9);
+            assert!(clip.z > 0.0 && clip.z < clip.w, "{point} {clip}");
+            // The way from the mirrored eye crosses the floor at this share of itself.
+            let crossing = mirror.height_m / (mirror.height_m + point.y);
+            let at = mirror.camera.eye.lerp(point, crossing);
+            let behind = (1.0 - clip.z / clip.w) / (mirror.depth_step * mirror.height_m) * through(at).w;
+            assert!((behind - (1.0 - crossing)).abs() < 1e-3, "{point}: {behind} {crossing}");
+        }
+        let below = through(DVec3::new(0.2, -0.1, -0.5));
+        assert!(below.z > below.w, "{below}");
+    }
+
+    #[test]
+    fn the_faces_of_a_box_are_flat_and_those_of_a_ball_are_not() {
+        let faces = flat_faces(&cuboid(Vec3::new(1.0, 2.0, 3.0), 4));
+        assert_eq!(faces.len(), 6);
+        for (corners, normal) in &faces {
+            let area = (corners[1] - corners[0]).length() * (corners[2] - corners[1]).length();
+            let wanted = 6.0 / DVec3::new(1.0, 2.0, 3.0).dot(normal.abs());
+            assert!((area - wanted).abs() < 1e-5, "{normal}: {area}");
+        }
+        assert!(flat_faces(&sphere(1.0, 3)).is_empty());
+    }
+
+    #[test]
+    fn a_polygon_covers_its_share_of_the_picture() {
+        let seen = seen();
+        let across = |half: f64| {
+            let [x, y] = [half, half];
+            [(-x, -y), (x, -y), (x, y), (-x, y)].map(|(x, y)| {
+                let point = seen.clip_from_world.inverse() * DVec4::new(x, y, 1.0, 1.0);
+                point.truncate() / point.w
+            })
+        };
+        for (half, wanted) in [(0.5, 0.25), (1.0, 1.0), (3.0, 1.0)] {
+            let share = share_of_picture(seen.clip_from_world, across(half));
+            assert!((share - wanted).abs() < 1e-6, "{half}: {share}");
+        }
+    }
+}

@@ -102,8 +102,6 @@ vec3 glossy(uint index, vec3 base, vec3 light, vec4 share, vec2 uv, float within
     if (mirrors > 0.0) {
         vec3 tilt = view.normal - n;
         vec4 mirrored = mirrored_light(entity, sqrt(view.alpha * view.alpha + dot(tilt, tilt)));
-        // Without a sky what is missing is blur past the end of what is drawn.
-        mirrored.rgb /= entity.sky_scale == 0.0 ? max(mirrored.a, 0.5) : 1.0;
         through = mix(through, vec3((1.0 - mirrored.a) * entity.sky_scale), mirrors);
         nearby = mix(nearby, mirrored.rgb, mirrors);
     }

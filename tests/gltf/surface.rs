@@ -264,6 +264,23 @@ fn colours_of_vertices_tint_a_surface() {
     assert_eq!(*tints, [[Vec3::ZERO; 3], [Vec3::ONE; 3]].concat());
 }
 
+/// The alpha of its vertices is a factor on a surface's own.
+#[test]
+fn alphas_of_vertices_blend_a_surface() {
+    let mut model = Model::default();
+    let positions = model.positions(&[0., 0., 0., 6., 0., 0., 0., 1., 0.]);
+    let colors = model.floats(4, &[1., 1., 1., 0.2, 1., 1., 1., 0.4, 1., 1., 1., 0.6]);
+    for mode in ["BLEND", "OPAQUE"] {
+        let color = json!({ "baseColorFactor": [1, 1, 1, 0.5] });
+        let material = model.push("materials", json!({ "alphaMode": mode, "pbrMetallicRoughness": color }));
+        let mesh = model.mesh(json!({ "POSITION": positions, "COLOR_0": colors }), None, Some(material));
+        model.node(json!({ "mesh": mesh }));
+    }
+    let (scene, _) = model::scene(&model);
+    assert!((scene.entities[0].opacity - 0.2).abs() < 1e-6, "{}", scene.entities[0].opacity);
+    assert_eq!(scene.entities[1].opacity, 1.0);
+}
+
 /// Of blending the alpha is the opacity; glass keeps back what its colour does not pass, and what it passes it does not
 /// reflect.
 #[test]

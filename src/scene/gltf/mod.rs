@@ -16,7 +16,7 @@
 //! | base colour factor | albedo |
 //! | base colour texture, colours of vertices, alpha mask | texture; tints of the mesh's vertices |
 //! | double-sided surfaces that alpha cuts out | backs of their own; all others are lit from their fronts |
-//! | alpha blending, transmission | opacity, of transmission less the luminance of what passes: glass is thin and grey |
+//! | alpha blending with the mean of vertices, transmission | opacity, of transmission less the luminance of what passes: glass is thin and grey |
 //! | roughness, metal, index of refraction, specular factor | gloss |
 //! | textures of roughness and metal, of normals | maps |
 //! | emissive factor and strength | emission |

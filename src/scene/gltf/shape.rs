@@ -207,8 +207,8 @@ impl Shape {
         (positions, normals, self.triangles.iter().map(turned).collect())
     }
 
-    /// Numbers of an attribute for every vertex, `width` of each element; `None` where the primitive has no such
-    /// attribute.
+    /// Numbers of an attribute for every vertex, `width` of each element, or 1 where it has fewer; `None` where the
+    /// primitive has no such attribute.
     pub fn attribute(
         &self,
         document: &Document,
@@ -223,7 +223,8 @@ impl Shape {
         if self.source.iter().max().is_some_and(|last| *last as usize >= count) {
             return Err(document.fail(&self.place, format!("there are fewer {} than positions", of.to_string())));
         }
-        Ok(Some(self.source.iter().flat_map(|i| &numbers[*i as usize * stored..][..width]).copied().collect()))
+        let at = |element: &u32, k: usize| if k < stored { numbers[*element as usize * stored + k] } else { 1.0 };
+        Ok(Some(self.source.iter().flat_map(|element| (0..width).map(move |k| at(element, k))).collect()))
     }
 
     pub fn triangle_count(&self) -> usize {

@@ -87,11 +87,13 @@ impl Surface {
         let json = material.map_or(&default, |index| &document.root.materials[index]);
         let place = material.map_or("the default material".to_owned(), |index| format!("materials[{index}]"));
         let pbr = &json.pbr_metallic_roughness;
-        let [r, g, b, alpha] = pbr.base_color_factor.0;
+        let [r, g, b, mut alpha] = pbr.base_color_factor.0;
         let mut albedo = Vec3::new(r, g, b);
         let mut attributes = Attributes::default();
-        if let Some(colors) = shape.attribute(document, &Semantic::Colors(0), &[3, 4], 3)? {
-            let colors: Vec<Vec3> = colors.chunks_exact(3).map(Vec3::from_slice).collect();
+        if let Some(colors) = shape.attribute(document, &Semantic::Colors(0), &[3, 4], 4)? {
+            // Of alphas the mean counts.
+            alpha *= colors.chunks_exact(4).map(|c| c[3]).sum::<f32>() / (colors.len() / 4) as f32;
+            let colors: Vec<Vec3> = colors.chunks_exact(4).map(Vec3::from_slice).collect();
             if is_even(&colors) {
                 albedo *= colors[0];
             } else {

@@ -15,8 +15,10 @@ use glam::Vec4;
 use std::collections::HashSet;
 use std::sync::Arc;
 
-/// Levels of detail: the coarsest texels are 32 of the finest wide.
-pub const LEVELS: u32 = 6;
+/// Levels of detail.
+const LEVELS: u32 = 6;
+/// Texels of the finest level along a texel of the coarsest.
+const COARSEST: u32 = 1 << (LEVELS - 1);
 /// Radius, in slopes of the microfacets times the distance, that a lobe is blurred by.
 pub const SPREAD: f64 = 1.6;
 /// Least cosine of the angle between a pixel's normal and the plane's.
@@ -37,10 +39,9 @@ impl Mirrors {
     /// For pictures of `width` x `height` in which at most `count` planes are mirrors.
     pub fn new(device: &Arc<Device>, library: &Library, size: [u32; 2], count: u32) -> Result<Self> {
         // Texels of the coarsest level belong to one mirror each.
-        let coarsest = 1 << (LEVELS - 1);
-        let most = device.most_image_px() / count / coarsest * coarsest;
+        let most = device.most_image_px() / count / COARSEST * COARSEST;
         let texel_px = if device.info.is_software() { 2 } else { 1 };
-        let part = size.map(|pixels| pixels.div_ceil(texel_px).next_multiple_of(coarsest).min(most));
+        let part = size.map(|pixels| pixels.div_ceil(texel_px).next_multiple_of(COARSEST).min(most));
         let lights = PictureLights { pixels: None, highlights: None, mirrors: 0 };
         let draw = Draw::new(device, library, [count * part[0], part[1]], Antialias::None, lights)?;
         let shape = draw.picture.shape;
@@ -78,6 +79,13 @@ impl Mirrors {
 
     /// Draws what the mirrors show, one viewport each, and makes it ready to be sampled.
     pub fn record<'r>(&'r self, commands: &mut Commands<'r>, viewports: &[DrawnViewport<'r>]) -> Result<()> {
+        if viewports.is_empty() {
+            // They are bound, and not read.
+            self.levels.iter().for_each(|levels| commands.image_barrier(levels.image(), None, Access::GraphicsSampled));
+            return Ok(());
+        }
+        // The parts in use, and what filters of the coarsest level read beside them.
+        let width = (viewports.len() as u32 * self.part[0] + COARSEST).min(self.far.shape.width);
         for (image, access) in self.draw.attachments() {
             commands.image_barrier(image, None, access);
         }
@@ -86,12 +94,12 @@ impl Mirrors {
         commands.image_barrier(&self.far, None, Access::ColorWrite);
         let target = Target { color: &self.far, clear: None, depth: None, resolve: None };
         commands.render(&target, |drawing| {
-            drawing.area([0, 0, self.far.shape.width, self.far.shape.height]);
+            drawing.area([0, 0, width, self.far.shape.height]);
             drawing.screen(&self.to_far, &[Bind::Image(&self.draw.depth)], &())
         })?;
         for (image, levels) in [&self.draw.picture, &self.far].into_iter().zip(&self.levels) {
             commands.image_barrier(image, Some(Access::ColorWrite), Access::TransferRead);
-            commands.fill_levels(image, levels);
+            commands.fill_levels(image, levels, width);
         }
         Ok(())
     }

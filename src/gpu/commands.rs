@@ -275,9 +275,10 @@ impl<'r> Commands<'r> {
         unsafe { handle.cmd_copy_image(buffer, from.raw(), read, to.raw(), write, &[region]) };
     }
 
-    /// Fills all levels of a texture, each with the one before at half its size, from an image of its own size. The image
-    /// was made the source of a copy; the texture loses its content and is ready to be sampled.
-    pub fn fill_levels(&mut self, from: &'r Image, texture: &'r Texture) {
+    /// Fills all levels of a texture, each with the one before at half its size, from the first `width` columns of an
+    /// image of its own size. The image was made the source of a copy; the texture loses its content and is ready to be
+    /// sampled.
+    pub fn fill_levels(&mut self, from: &'r Image, texture: &'r Texture, width: u32) {
         let to = texture.image();
         self.image_barrier(to, None, Access::TransferWrite);
         let pass = self.pass_name();
@@ -287,7 +288,7 @@ impl<'r> Commands<'r> {
         let (handle, buffer) = self.raw();
         let layers = packed(to).image_subresource;
         let corner = |level: u32| {
-            let [width, height] = [to.shape.width, to.shape.height].map(|size| (size >> level).max(1).cast_signed());
+            let [width, height] = [width, to.shape.height].map(|size| (size >> level).max(1).cast_signed());
             [vk::Offset3D::default(), vk::Offset3D { x: width, y: height, z: 1 }]
         };
         let turn = |level: u32, from: vk::ImageLayout, to_layout: vk::ImageLayout| {
@@ -306,7 +307,7 @@ impl<'r> Commands<'r> {
                 handle.cmd_pipeline_barrier2(buffer, &vk::DependencyInfo::default().image_memory_barriers(&barriers));
             }
         };
-        let extent = vk::Extent3D { width: to.shape.width, height: to.shape.height, depth: 1 };
+        let extent = vk::Extent3D { width, height: to.shape.height, depth: 1 };
         let first = [vk::ImageCopy::default().src_subresource(layers).dst_subresource(layers).extent(extent)];
         // SAFETY: both are borrowed until the commands have run, and the layouts are those stated above.
         unsafe { handle.cmd_copy_image(buffer, from.raw(), read, to.raw(), write, &first) };

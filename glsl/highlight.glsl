@@ -1,17 +1,12 @@
 // The reflection of a sharp light: the share of the microfacets that mirror it, times the light they all would reflect.
 // The shader that includes this includes sub_light.glsl and gloss.glsl.
 
+#include "surface_axes.glsl"
+
 // Slope of the microfacets that mirror a direction, by two axes of the surface, in widths of the lobe.
 vec2 slope_of(View view, mat3 surface, vec3 along) {
     vec3 half_vector = (along + view.toward) * surface;
     return half_vector.xy / (max(half_vector.z, LEAST_HALF_Z) * view.alpha);
-}
-
-// Axes of a surface, the normal last: Duff et al., Building an Orthonormal Basis, Revisited, JCGT 6(1), 2017.
-mat3 surface_axes(vec3 n) {
-    float side = n.z < 0.0 ? -1.0 : 1.0;
-    float a = -1.0 / (side + n.z), b = n.x * n.y * a;
-    return mat3(vec3(1.0 + side * n.x * n.x * a, side * b, -side * n.x), vec3(b, side + n.y * n.y * a, -n.y), n);
 }
 
 // What an edge adds to the share of the microfacets whose slopes lie in a polygon: Green's theorem.

@@ -4,15 +4,7 @@
 // and the macros SELF_SIDE, SELF_RIM, SELF_LIMIT, SELF_STEPS, SELF_FIRST and SELF_RAMP
 // (`ShaderPermutation::self_visibility`).
 
-// Axes of a vertex's hemisphere from its unit normal: columns tangent, bitangent, normal. The normal must be the mesh's
-// own, in the object's frame; the axes may then be turned to any other frame in which directions are given.
-mat3 self_frame(vec3 normal) {
-    float s = normal.z >= 0.0 ? 1.0 : -1.0;
-    float a = -1.0 / (s + normal.z);
-    float b = normal.x * normal.y * a;
-    vec3 tangent = vec3(1.0 + s * normal.x * normal.x * a, s * b, -s * normal.x);
-    return mat3(tangent, vec3(b, s + normal.y * normal.y * a, -normal.y), normal);
-}
+#include "surface_axes.glsl"
 
 // Distance on the octahedron |x| + |y| + z = 1, along the normal and across it.
 float self_reach(vec3 local) {
@@ -51,5 +43,5 @@ float self_visible(uint first_cell, mat3 frame, vec3 direction, float radius, fl
 
 // The same for one direction in the object's frame.
 float self_visible(uint first_cell, vec3 normal, vec3 direction, float radius, float distance) {
-    return self_visible(first_cell, self_frame(normal), direction, radius, distance);
+    return self_visible(first_cell, surface_axes(normal), direction, radius, distance);
 }

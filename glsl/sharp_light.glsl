@@ -87,7 +87,7 @@ Facing facing_of(Entity receiver, vec3 normal, float weight, uint self_first, ui
 #if SELF
     facing.counts = true;
     facing.self_first = self_first == NONE ? NONE : self_first + v * ((SELF_SIDE - 1) * (SELF_SIDE - 1));
-    mat3 frame = self_frame(normal);
+    mat3 frame = surface_axes(normal);
     facing.self_frame = mat3(to_world(receiver, frame[0]), to_world(receiver, frame[1]), facing.normal);
 #endif
     return facing;

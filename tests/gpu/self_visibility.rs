@@ -107,7 +107,7 @@ void main() {
     vec4 light = rays[2 * i + 1];
     uint first = i % 16 * push.cell_count;
     found[i] = vec2(self_visible(first, normal, light.xyz, light.w, distance),
-        self_visible(first, self_frame(normal), light.xyz, light.w, distance));
+        self_visible(first, surface_axes(normal), light.xyz, light.w, distance));
 }
 "#;
 

@@ -117,7 +117,7 @@ Linked linked_light(View view, vec3 place, uint v) {
         vec3 along = middle.xyz - place;
         along *= inversesqrt(max(dot(along, along), 1e-30));
         float lit = max(dot(view.normal, along), LEAST_COSINE);
-        float weight = mirroring(view, along, PI * share / lit) * mirrored(view, along, lit);
+        float weight = PI * share * lobe_of_part(view, along, lit, PI * share / lit);
         sum += share * light;
         weighed += weight * light;
         whole += weight;

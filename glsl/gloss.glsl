@@ -135,27 +135,14 @@ float half_cosine(View view, vec3 along) {
     return max(sqrt(max(0.5 + 0.5 * dot(along, view.toward), 0.0)), 1e-4);
 }
 
-// Share of the microfacets whose slopes lie in a disc. Slopes are in widths of the lobe; `away` is the square of the
-// distance of the disc's middle from no slope, `radius` the square of its radius. GGX, 1 / pi (1 + p^2)^2, is a uniform
-// sphere projected stereographically, and discs are its caps.
-float share_in_disc(float away, float radius) {
-    float apart = 1.0 + away - radius, scale = sqrt(apart * apart + 4.0 * radius);
-    return apart > 0.0 ? 2.0 * radius / (scale * (scale + apart)) : 0.5 - 0.5 * apart / scale;
-}
-
-// Light that all microfacets would reflect from a direction, without Schlick's term, if all of them mirrored it; `lit` is
-// its cosine to the normal.
-float mirrored(View view, vec3 along, float lit) {
+// The lobe towards a small part of a light, without Schlick's term. `along` is unit, to its middle, `lit` its cosine to
+// the normal and `omega` its solid angle. The part counts as a point, and the slopes are as much wider as it is wide.
+float lobe_of_part(View view, vec3 along, float lit, float omega) {
     float view_half = half_cosine(view, along);
-    float half_z = max(dot(view.normal, along + view.toward) / (2.0 * view_half), LEAST_HALF_Z);
-    return 4.0 * view_half / half_z * masking(view, lit) * lit;
-}
-
-// The share of the microfacets that mirror a small part of a light of solid angle `omega`.
-float mirroring(View view, vec3 along, float omega) {
-    float view_half = half_cosine(view, along);
-    float half_z = clamp(dot(view.normal, along + view.toward) / (2.0 * view_half), LEAST_HALF_Z, 1.0);
-    float square = view.alpha * view.alpha, cosine = half_z * half_z;
-    return share_in_disc((1.0 - cosine) / (cosine * square), omega / (4.0 * PI * view_half * half_z * cosine * square));
+    float half_z = max(dot(view.normal, along + view.toward) / (2.0 * view_half), 0.0);
+    float slopes = min(omega / max(4.0 * view_half * half_z * half_z * half_z, 1e-30), MOST_SLOPES);
+    float widened = view.alpha * view.alpha + WIDENED * slopes;
+    float below = (widened - 1.0) * half_z * half_z + 1.0;
+    return widened / (PI * below * below) * masking(view, lit);
 }
 #endif

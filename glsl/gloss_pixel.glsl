@@ -98,12 +98,12 @@ vec3 glossy(uint index, vec3 base, vec3 light, vec4 share, vec2 uv, float within
     vec2 of_unit = reflected_share(view, roughness);
     vec3 through = found.facing, nearby = found.grazing;
 #if MIRRORED
-    float mirrors = is_mirror(entity, n, from_eye);
-    if (mirrors > 0.0) {
+    float of_mirror = mirror_share(entity, n, from_eye);
+    if (of_mirror > 0.0) {
         vec3 tilt = view.normal - n;
         vec4 mirrored = mirrored_light(entity, sqrt(view.alpha * view.alpha + dot(tilt, tilt)));
-        through = mix(through, vec3((1.0 - mirrored.a) * entity.sky_scale), mirrors);
-        nearby = mix(nearby, mirrored.rgb, mirrors);
+        through = mix(through, vec3((1.0 - mirrored.a) * entity.sky_scale), of_mirror);
+        nearby = mix(nearby, mirrored.rgb, of_mirror);
     }
 #endif
     found = Reflection(of_unit.x * nearby, of_unit.y * nearby);

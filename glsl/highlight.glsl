@@ -1,12 +1,26 @@
 // The reflection of a sharp light: the share of the microfacets that mirror it, times the light they all would reflect.
 // The shader that includes this includes sub_light.glsl and gloss.glsl.
-
 #include "surface_axes.glsl"
 
 // Slope of the microfacets that mirror a direction, by two axes of the surface, in widths of the lobe.
 vec2 slope_of(View view, mat3 surface, vec3 along) {
     vec3 half_vector = (along + view.toward) * surface;
     return half_vector.xy / (max(half_vector.z, LEAST_HALF_Z) * view.alpha);
+}
+
+// Share of the microfacets whose slopes lie in a disc, by the squares of its middle's distance from no slope and of its
+// radius. GGX, 1 / pi (1 + p^2)^2, is a uniform sphere projected stereographically, and discs are its caps.
+float share_in_disc(float away_square, float radius_square) {
+    float apart = 1.0 + away_square - radius_square, scale = sqrt(apart * apart + 4.0 * radius_square);
+    return apart > 0.0 ? 2.0 * radius_square / (scale * (scale + apart)) : 0.5 - 0.5 * apart / scale;
+}
+
+// Light that is reflected from a direction, without Schlick's term, if all microfacets mirrored it; `lit` is its cosine
+// to the normal.
+float light_of_all(View view, vec3 along, float lit) {
+    float view_half = half_cosine(view, along);
+    float half_z = max(dot(view.normal, along + view.toward) / (2.0 * view_half), LEAST_HALF_Z);
+    return 4.0 * view_half / half_z * masking(view, lit) * lit;
 }
 
 // What an edge adds to the share of the microfacets whose slopes lie in a polygon: Green's theorem.
@@ -22,6 +36,7 @@ float share_by_edge(vec2 from, vec2 to) {
 // The light's outline as slopes: the ends of two diameters of a disc, or the corners of a rectangle.
 struct Outline {
     vec2 ends[4];
+    float lowest; // least cosine of the normal and those microfacets'
     bool polygon;
 };
 
@@ -31,9 +46,12 @@ Outline outline_of(View view, mat3 surface, SeenLight light, mat3 axes) {
 #if PANELS
     outline.polygon = is_rectangle(light);
 #endif
+    outline.lowest = 1.0;
     vec2 place = outline.polygon ? vec2(1.0) : vec2(1.0, 0.0);
     for (uint k = 0; k < 4; k++) {
-        outline.ends[k] = slope_of(view, surface, axes * along_axes(light, place));
+        vec3 along = axes * along_axes(light, place);
+        outline.ends[k] = slope_of(view, surface, along);
+        outline.lowest = min(outline.lowest, dot(view.normal, normalize(along + view.toward)));
         place = vec2(-place.y, place.x);
     }
     return outline;
@@ -52,39 +70,53 @@ float share_in_rectangle(View view, mat3 surface, SeenLight light, mat3 axes, Ou
     return abs(sum);
 }
 
+// The share of the microfacets that mirror a light, and the place on it that most of these mirror.
+float share_in_outline(View view, mat3 surface, SeenLight light, mat3 axes, Outline outline, out vec2 place) {
+    vec2 first = 0.5 * (outline.ends[0] - outline.ends[2]), second = 0.5 * (outline.ends[1] - outline.ends[3]);
+    vec2 middle = 0.25 * (outline.ends[0] + outline.ends[1] + outline.ends[2] + outline.ends[3]);
+    float turn = first.x * second.y - first.y * second.x, away = dot(middle, middle);
+    // The disc of the same area, and the place on the light that a mirror would show. No light is smaller than a pixel.
+    float radius = abs(turn) * (outline.polygon ? 2.0 / PI : 1.0);
+    float footprint = view.footprint / (view.alpha * view.alpha), widened = max(length(vec2(radius, footprint)), 1e-30);
+    turn = abs(turn) < 1e-20 ? 1e-20 : turn;
+    vec2 across = vec2(second.x * middle.y - second.y * middle.x, first.y * middle.x - first.x * middle.y) / turn;
+    across = clamp(across, -1e9, 1e9);
+    float share;
+    if (outline.polygon && radius > max(WIDE_OUTLINE * (1.0 + away), footprint)) {
+        share = share_in_rectangle(view, surface, light, axes, outline);
+    } else {
+        // An ellipse that is wide counts by where its own outline lies.
+        float wide = 16.0 * radius * radius;
+        float by_outline = outline.polygon ? 0.0 : wide / max(wide + away * away, 1e-30);
+        share = share_in_disc(mix(away, dot(across, across) * radius, by_outline), widened) * radius / widened;
+    }
+    // Diameters lead to the corners of a rectangle.
+    place = outline.polygon ? vec2(across.x - across.y, across.x + across.y) : across;
+    float off = outline.polygon ? max(abs(place.x), abs(place.y)) : length(place);
+    place *= radius / ((1.0 + radius) * max(off, 1.0));
+    return share;
+}
+
 // The reflection of a whole light, of radiance 1; `to` leads to its centre.
 vec2 reflect_light(View view, vec3 to, Entity shining) {
     SeenLight light = seen_light(to, shining);
     mat3 axes = mat3(light.toward, light.across, light.down), surface = surface_axes(view.normal);
     Outline outline = outline_of(view, surface, light, axes);
-    vec2 first = 0.5 * (outline.ends[0] - outline.ends[2]), second = 0.5 * (outline.ends[1] - outline.ends[3]);
-    vec2 middle = 0.25 * (outline.ends[0] + outline.ends[1] + outline.ends[2] + outline.ends[3]);
-    float turn = first.x * second.y - first.y * second.x, away = dot(middle, middle);
-    // The disc of the same area, and the place on the light that a mirror would show.
-    float radius = abs(turn) * (outline.polygon ? 2.0 / PI : 1.0);
-    turn = abs(turn) < 1e-20 ? 1e-20 : turn;
-    vec2 place = vec2(second.x * middle.y - second.y * middle.x, first.y * middle.x - first.x * middle.y) / turn;
-    float share;
-    if (outline.polygon && radius > WIDE_OUTLINE * (1.0 + away)) {
-        share = share_in_rectangle(view, surface, light, axes, outline);
-    } else {
-        // An ellipse that is wide counts by where its own outline lies. No light is smaller than a pixel.
-        float wide = 16.0 * radius * radius;
-        float by_outline = outline.polygon ? 0.0 : wide / max(wide + away * away, 1e-30);
-        float widened = max(length(vec2(radius, view.footprint / (view.alpha * view.alpha))), 1e-30);
-        share = share_in_disc(mix(away, dot(place, place) * radius, by_outline), widened) * radius / widened;
-    }
-    // The place that most of those microfacets mirror.
-    float off = outline.polygon ? max(abs(place.x), abs(place.y)) : length(place);
-    place *= radius / ((1.0 + radius) * max(off, 1.0));
-    vec3 along = along_axes(light, place);
-    float centre = dot(view.normal, light.toward);
-    float lit = max(dot(view.normal, axes * along), part_cosine(centre, light.sine));
-    float above = clamp(0.5 + 0.5 * centre / light.sine, 0.0, 1.0);
+    float centre = dot(view.normal, light.toward), cosine = part_cosine(centre, light.sine);
+    vec2 place;
+    float share = share_in_outline(view, surface, light, axes, outline, place);
+    vec3 by_axes = along_axes(light, place), along = axes * by_axes;
+    float lit = max(dot(view.normal, along), cosine);
+    float value = share * light_of_all(view, along, lit);
+    // Slopes have no bound at the horizon: there the light is a point.
+    float omega = part_light(light, Block(vec2(0.0), 0.0, 1.0, 1.0), vec2(0.0), along_axes(light, vec2(0.0)));
+    float low = lobe_of_part(view, light.toward, cosine, omega) * cosine * omega;
+    value = mix(low, value, clamp((outline.lowest - LOW_FROM) / (LOW_TO - LOW_FROM), 0.0, 1.0));
+    value *= clamp(0.5 + 0.5 * centre / light.sine, 0.0, 1.0);
+    bool seen = lit > 0.0;
 #if PANELS
-    above = is_panel(light) && dot(light.facing, along) > 0.0 ? 0.0 : above;
+    seen = seen && !(is_panel(light) && dot(light.facing, by_axes) > 0.0);
 #endif
-    along = axes * along;
-    float value = lit > 0.0 ? share * above * mirrored(view, along, lit) : 0.0, term = schlick(half_cosine(view, along));
-    return value * vec2(1.0 - term, term);
+    float term = schlick(half_cosine(view, along));
+    return seen ? value * vec2(1.0 - term, term) : vec2(0.0);
 }

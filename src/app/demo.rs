@@ -147,7 +147,7 @@ fn still(
         entities: scene.entities.len(),
         bake_s: (!baked.is_empty()).then(|| baked.iter().map(|b| b.report.total.as_secs_f64()).sum()),
         merge_ms: median(&outlines, &["merge", "sharp"]),
-        draw_ms: median(&outlines, &["draw", "smooth"]),
+        draw_ms: median(&outlines, &["mirror", "draw", "smooth"]),
         frame_ms: median(&outlines, &["frame"]),
         frames_per_s: 1e3 / median(&outlines, &["frame"]),
         frames_per_s_at_4_samples: 1e3 / median(&samples, &["frame"]),

@@ -19,11 +19,16 @@ use std::sync::Arc;
 const LEVELS: u32 = 6;
 /// Texels of the finest level along a texel of the coarsest.
 const COARSEST: u32 = 1 << (LEVELS - 1);
-/// Radius, in slopes of the microfacets times the distance, that a lobe is blurred by.
+/// Radius of the blur over that of the microfacets' slopes, at a distance of 1 from the mirror.
 pub const SPREAD: f64 = 1.6;
-/// Least cosine of the angle between a pixel's normal and the plane's.
+/// Least cosine of the angle between a pixel's normal and the plane's. What this leaves of 1 is how far off the plane a
+/// pixel may lie, over its distance from the eye.
 pub const FLAT: f64 = 0.999;
 
+/// What half floats hold. Radiance above is brought down to it, as blur would spread what is infinite.
+const MOST_RADIANCE: f32 = 65_504.0;
+
+/// What planes mirror, in one picture.
 pub struct Mirrors {
     draw: Draw,
     /// What depth leaves of 1.
@@ -36,12 +41,15 @@ pub struct Mirrors {
 }
 
 impl Mirrors {
-    /// For pictures of `width` x `height` in which at most `count` planes are mirrors.
+    /// For pictures of `size`, width and height in pixels, in which at most `count` planes are mirrors.
     pub fn new(device: &Arc<Device>, library: &Library, size: [u32; 2], count: u32) -> Result<Self> {
         // Texels of the coarsest level belong to one mirror each.
-        let most = device.most_image_px() / count / COARSEST * COARSEST;
         let texel_px = if device.info.is_software() { 2 } else { 1 };
-        let part = size.map(|pixels| pixels.div_ceil(texel_px).next_multiple_of(COARSEST).min(most));
+        let most = device.most_image_px();
+        let fit = |pixels: u32, most: u32| {
+            pixels.div_ceil(texel_px).next_multiple_of(COARSEST).min(most / COARSEST * COARSEST)
+        };
+        let part = [fit(size[0], most / count), fit(size[1], most)];
         let lights = PictureLights { pixels: None, highlights: None, mirrors: 0 };
         let draw = Draw::new(device, library, [count * part[0], part[1]], Antialias::None, lights)?;
         let shape = draw.picture.shape;
@@ -89,7 +97,7 @@ impl Mirrors {
         for (image, access) in self.draw.attachments() {
             commands.image_barrier(image, None, access);
         }
-        self.draw.record(commands, viewports, Vec4::ZERO, f32::INFINITY)?;
+        self.draw.record(commands, viewports, Vec4::ZERO, MOST_RADIANCE)?;
         commands.image_barrier(&self.draw.depth, Some(Access::DepthWrite), Access::GraphicsSampled);
         commands.image_barrier(&self.far, None, Access::ColorWrite);
         let target = Target { color: &self.far, clear: None, depth: None, resolve: None };

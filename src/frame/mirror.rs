@@ -11,7 +11,7 @@ use crate::layout::GlossEntity;
 use crate::lists::sight::SightCamera;
 use crate::scene::{Placement, Scene};
 use glam::{DMat4, DVec2, DVec3, DVec4, Vec3};
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 
 /// The most planes that are mirrors at a time.
 const MOST: usize = 4;
@@ -20,8 +20,12 @@ const LEAST_SHARE: f64 = 5e-4;
 /// Least share of a mesh's surface in a face that may be a mirror, and how many faces of a mesh may be.
 const LEAST_FACE: f64 = 0.04;
 const MOST_FACES: usize = 8;
-/// Faces whose normals and offsets, in their distance from the eye, differ by less are one mirror.
+/// Faces whose normals and offsets, over the eye's distance from the plane, differ by less are one mirror.
 const SAME_PLANE: f64 = 1e-3;
+/// Distance from the plane, over the eye's, within which nothing is mirrored: that of the faces themselves.
+const CLIPPED: f64 = 2.0 * SAME_PLANE;
+/// Share of a mirror's score above the least one at which it is shown whole.
+const FADE: f64 = 0.2;
 
 /// A flat face of a glossy entity.
 pub(super) struct Face {
@@ -41,7 +45,7 @@ pub(super) struct Mirror {
     share: f64,
     /// Distance of the eye from the plane, metres.
     height_m: f64,
-    /// What a step away from the plane takes from depth, over the view depth.
+    /// What a metre away from the plane takes from depth, times the view depth in metres.
     depth_step: f64,
 }
 
@@ -135,9 +139,9 @@ impl Mirror {
         let corners = [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)];
         let steepest = corners.into_iter().map(|(x, y)| steepness(x, y)).fold(1e-3, f64::max);
         // Depth is 1 on the plane and falls with the distance from it over the view depth: what lies behind the plane
-        // is clipped. The plane itself is not drawn.
+        // is clipped.
         let depth_step = 1.0 / steepest;
-        let above = plane - DVec4::W * (1e-4 * height_m);
+        let above = plane - DVec4::W * (CLIPPED * height_m);
         clip.z_axis = clip.w_axis - depth_step * above;
         let camera =
             SightCamera { clip_from_world: clip.transpose(), eye, near_m: seen.near_m, size: part, samples: false };
@@ -146,10 +150,10 @@ impl Mirror {
 }
 
 impl Frame {
-    /// The planes that mirror in a picture of these viewports: none where it has several.
+    /// The planes that mirror in a picture of these viewports: none unless one shows light in all of it.
     pub(super) fn mirrors_of(&self, placements: &[Placement], viewports: &[Viewport]) -> Vec<Mirror> {
         let ([viewport], Some(mirrors)) = (viewports, &self.picture.draw.mirrors) else { return Vec::new() };
-        if !viewport.shows_light() || self.reflections.is_none() {
+        if *viewport != self.whole() || self.reflections.is_none() {
             return Vec::new();
         }
         let seen = self.camera([viewport.area[2], viewport.area[3]]);
@@ -162,7 +166,7 @@ impl Frame {
             let height_m = plane.dot(seen.eye.extend(1.0));
             let middle = corners.iter().sum::<DVec3>() / 4.0;
             let distance_m = middle.distance(seen.eye);
-            if height_m < 1e-3 * distance_m {
+            if height_m < 1e-6 * distance_m {
                 continue;
             }
             let entity = &self.scene.entities[face.entity];
@@ -172,7 +176,7 @@ impl Frame {
             let score = reflectance * share_of_picture(seen.clip_from_world, corners);
             let same = |(mirror, _): &&mut (Mirror, f64)| {
                 let off = mirror.plane.dot(middle.extend(1.0)).abs();
-                (mirror.plane - plane).truncate().length() < SAME_PLANE && off < SAME_PLANE * distance_m
+                (mirror.plane - plane).truncate().length() < SAME_PLANE && off < SAME_PLANE * height_m
             };
             match found.iter_mut().find(same) {
                 Some((mirror, sum)) => {
@@ -187,10 +191,16 @@ impl Frame {
             }
         }
         found.sort_by(|(_, a), (_, b)| b.total_cmp(a));
+        // An entity is one mirror, the one that is seen best.
+        let mut taken = HashSet::new();
+        for (mirror, _) in &mut found {
+            mirror.entities.retain(|entity| taken.insert(*entity));
+        }
+        found.retain(|(mirror, _)| !mirror.entities.is_empty());
         // None comes or goes in a step.
         let least = found.get(mirrors.count()).map_or(0.0, |(_, score)| *score).max(LEAST_SHARE);
         let shown = found.into_iter().filter(|(_, score)| *score > least).take(mirrors.count());
-        shown.map(|(mirror, score)| Mirror { share: (score / least - 1.0).min(1.0), ..mirror }).collect()
+        shown.map(|(mirror, score)| Mirror { share: ((score / least - 1.0) / FADE).min(1.0), ..mirror }).collect()
     }
 
     /// What each mirror of the picture that was prepared last shows.
@@ -200,15 +210,14 @@ impl Frame {
         };
         let shown = |(number, mirror): (usize, &Mirror)| {
             let mut entities = self.drawn_entities(placements, &mirror.camera);
-            // Highlights stand for the lamps that have them.
-            let highlights = |entity: usize| {
-                let of = |glossy: &&crate::gloss::Glossy| mirror.entities.contains(&glossy.entity);
-                reflections.glossy.iter().filter(of).any(|glossy| glossy.lights.contains(&(entity as u32)))
-            };
+            // Highlights stand for the lamps that have them, and out of its cone a spot is dark.
+            let of: HashSet<usize> = mirror.entities.iter().copied().collect();
+            let shown = reflections.glossy.iter().filter(|glossy| of.contains(&glossy.entity));
+            let highlights: HashSet<u32> = shown.flat_map(|glossy| glossy.lights).collect();
             for entity in &mut entities {
                 entity.tag = if entity.transparent { entity.tag } else { 1.0 };
                 entity.gloss = None;
-                if highlights(entity.index as usize) {
+                if highlights.contains(&entity.index) || self.scene.entities[entity.index as usize].spot.is_some() {
                     entity.emission = Vec3::ZERO;
                 }
             }

@@ -18,14 +18,6 @@ pub fn distribution(alpha: f64, half_z: f64) -> f64 {
     alpha * alpha / (PI * below * below)
 }
 
-/// The share of the microfacets whose slopes, in widths of the lobe, lie in a disc of that radius with its middle that far
-/// from no slope. GGX, 1 / pi (1 + p^2)^2, is a uniform sphere projected stereographically, and discs are its caps.
-pub fn share_in_disc(away: f64, radius: f64) -> f64 {
-    let apart = 1.0 + away * away - radius * radius;
-    let scale = apart.hypot(2.0 * radius);
-    if apart > 0.0 { 2.0 * radius * radius / (scale * (scale + apart)) } else { 0.5 - 0.5 * apart / scale }
-}
-
 /// Masking and shadowing over 4 (n.v) (n.l): Smith's, correlated by height (Heitz, *Understanding the Masking-Shadowing
 /// Function*, JCGT 2014, equation 99).
 pub fn visibility(alpha: f64, view_z: f64, light_z: f64) -> f64 {
@@ -103,25 +95,6 @@ mod tests {
             }
         }
         assert_eq!(lobe(0.5, at(0.5, 0.0), DVec3::new(0.6, 0.0, -0.8)), [0.0; 2], "below the horizon");
-    }
-
-    /// Against a sum over the disc.
-    #[test]
-    fn shares_in_discs_are_sums_over_them() {
-        for (away, radius) in [(0.0, 0.5), (0.3, 1.0), (2.0, 0.1), (2.0, 3.0), (30.0, 0.01), (30.0, 40.0)] {
-            let count = 400;
-            let sum: f64 = (0..count * count)
-                .map(|i| {
-                    let r = radius * ((f64::from(i / count) + 0.5) / f64::from(count)).sqrt();
-                    let (sin, cos) = (2.0 * PI * (f64::from(i % count) + 0.5) / f64::from(count)).sin_cos();
-                    let square = (away + r * cos).powi(2) + (r * sin).powi(2);
-                    radius * radius / (1.0 + square).powi(2)
-                })
-                .sum();
-            let wanted = sum / f64::from(count * count);
-            let found = share_in_disc(away, radius);
-            assert!((found - wanted).abs() < 0.005 * wanted, "{away} {radius}: {found} {wanted}");
-        }
     }
 
     /// At grazing angles everything reflects all light, and faced a dielectric its own share.

@@ -46,8 +46,15 @@ pub const LEAST_ENERGY: f64 = 0.1;
 pub const MOST_TILTED: f64 = 4.0;
 /// Least cosine between the normal and a microfacet's.
 pub const LEAST_HALF_Z: f64 = 1e-3;
+/// How much wider slopes become by the width of a part of a light that counts as a point.
+pub const WIDENED: f64 = 0.35;
+/// Largest area of slopes by which they become wider: where view and light graze it has no bound.
+pub const MOST_SLOPES: f64 = 1.0;
 /// Area of a rectangle of light as slopes from which on it is no disc, over pi (1 + p^2), where it lies at p.
 pub const WIDE_OUTLINE: f64 = 0.01;
+/// Where the cosine between the normal and that of a microfacet that mirrors the light's rim is below the first, the
+/// light is a point; above the second it is its outline.
+pub const LOW_HALF_Z: [f64; 2] = [0.02, 0.12];
 
 /// A receiver that reflects: its vertices in the buffers of light.
 #[derive(Clone, Copy, Debug)]
@@ -73,7 +80,11 @@ pub fn macros(row: ShaderPermutation) -> ShaderPermutation {
         ("LEAST_ENERGY", LEAST_ENERGY),
         ("MOST_TILTED", MOST_TILTED),
         ("LEAST_HALF_Z", LEAST_HALF_Z),
+        ("MOST_SLOPES", MOST_SLOPES),
+        ("WIDENED", WIDENED),
         ("WIDE_OUTLINE", WIDE_OUTLINE),
+        ("LOW_FROM", LOW_HALF_Z[0]),
+        ("LOW_TO", LOW_HALF_Z[1]),
         ("TABLE", lobe::TABLE as f64),
         ("LEVELS", lobe::LEVELS as f64),
         ("MAP_SIDE", sky_map::SIDE as f64),

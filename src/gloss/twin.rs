@@ -3,13 +3,15 @@
 use super::lobe::{self, LEVELS, TABLE, TAPS};
 use super::sky_map::{SIDE, SkyMap};
 use super::{
-    LEAST_COSINE, LEAST_HALF_Z, LEAST_HIDDEN, LEAST_SHARE, LEAST_VIEW_Z, MOST_NEARBY, MOST_SHARE, PIXEL_ROUGHNESS, brdf,
+    LEAST_COSINE, LEAST_HIDDEN, LEAST_SHARE, LEAST_VIEW_Z, MOST_NEARBY, MOST_SHARE, MOST_SLOPES, PIXEL_ROUGHNESS,
+    WIDENED, brdf,
 };
 use crate::bounce::twin::SeenLink;
 use crate::field::octahedron;
 use crate::sh::basis::values;
 use crate::sh::lobe::clamped_cosine;
 use glam::DVec3;
+use std::f64::consts::PI;
 
 const COUNT: usize = 16;
 
@@ -103,15 +105,13 @@ impl Twin {
             let along = (link.middle - vertex.place).normalize_or_zero();
             let lit = vertex.normal.dot(along).max(LEAST_COSINE);
             let view_half = (0.5 + 0.5 * along.dot(vertex.toward)).max(0.0).sqrt().max(1e-4);
-            let half_z = vertex.normal.dot(along + vertex.toward) / (2.0 * view_half);
-            let half_z = half_z.clamp(LEAST_HALF_Z, 1.0);
-            let slope = (1.0 / (half_z * half_z) - 1.0).max(0.0).sqrt() / alpha;
-            let radius = (link.share / lit / (4.0 * view_half * half_z.powi(3))).sqrt() / alpha;
-            let mirrored = 4.0 * view_half / half_z * brdf::visibility(alpha, z, lit) * lit;
-            let weight = brdf::share_in_disc(slope, radius) * mirrored;
+            let half_z = (vertex.normal.dot(along + vertex.toward) / (2.0 * view_half)).max(0.0);
+            let slopes = PI * link.share / lit / (4.0 * view_half * half_z.powi(3)).max(1e-30);
+            let widened = alpha * alpha + WIDENED * slopes.min(MOST_SLOPES);
+            let weight = brdf::distribution(widened.sqrt(), half_z) * brdf::visibility(alpha, z, lit);
             mean += link.share * link.light;
-            lobe += weight * link.light;
-            whole += weight;
+            lobe += PI * link.share * weight * link.light;
+            whole += PI * link.share * weight;
         }
         let [hidden, nearby] = if self.map.scale == 0.0 { [(whole / energy).min(1.0), 1.0] } else { [hidden, nearby] };
         let kept = (*bounced / mean.max(DVec3::splat(1e-20))).clamp(DVec3::ZERO, DVec3::ONE);

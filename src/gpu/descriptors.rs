@@ -114,8 +114,9 @@ impl<'r> Commands<'r> {
                     }];
                     write = write.image_info(&images);
                 }
-                // It was filled before, and nothing writes it again.
                 (Kind::COMBINED_IMAGE_SAMPLER, Bind::Texture(texture)) => {
+                    let image = texture.image();
+                    self.tracker.use_image(image.id, &image.name, sampled, &pass);
                     images = [texture.descriptor()];
                     write = write.image_info(&images);
                 }

@@ -1,4 +1,4 @@
-//! Textures: sampled pictures with their levels of detail, filled once.
+//! Textures: sampled pictures with their levels of detail.
 
 use super::Checked;
 use super::access::Access;

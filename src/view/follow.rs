@@ -42,11 +42,11 @@ impl Pace {
             passes.iter().filter(|timing| timing.pass == name).map(|timing| timing.milliseconds).sum::<f64>()
         };
         if passes.iter().any(|timing| timing.pass == "merge") {
-            self.light =
-                passes.iter().map(|timing| timing.milliseconds).sum::<f64>() - of("draw") - of("smooth") - of("show");
+            let all = passes.iter().map(|timing| timing.milliseconds).sum::<f64>();
+            self.light = all - of("mirror") - of("draw") - of("smooth") - of("show");
         }
         if refined && passes.iter().any(|timing| timing.pass == "draw") {
-            self.refined_draw = Some(of("draw"));
+            self.refined_draw = Some(of("mirror") + of("draw"));
         }
     }
 

@@ -91,8 +91,10 @@ impl Surface {
         let mut albedo = Vec3::new(r, g, b);
         let mut attributes = Attributes::default();
         if let Some(colors) = shape.attribute(document, &Semantic::Colors(0), &[3, 4], 4)? {
-            // Of alphas the mean counts.
-            alpha *= colors.chunks_exact(4).map(|c| c[3]).sum::<f32>() / (colors.len() / 4) as f32;
+            if matches!(json.alpha_mode, Checked::Valid(AlphaMode::Blend)) {
+                // An entity has one opacity.
+                alpha *= colors.chunks_exact(4).map(|c| c[3]).sum::<f32>() / (colors.len() / 4) as f32;
+            }
             let colors: Vec<Vec3> = colors.chunks_exact(4).map(Vec3::from_slice).collect();
             if is_even(&colors) {
                 albedo *= colors[0];

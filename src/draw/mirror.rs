@@ -1,9 +1,9 @@
 //! Pass "mirror": what flat glossy surfaces mirror.
 //!
 //! For each plane that mirrors, the scene is drawn as the eye's mirror image sees it, by the light of vertices, into a
-//! part of one picture, at half the size on software devices. A pixel of the plane finds there what it mirrors at its own place, blurred by
-//! the lobe and by how far behind the mirror that is: levels of detail of the picture are the blur. Where the picture is
-//! empty the sky is mirrored.
+//! part of one picture, at half the size on software devices. A pixel of the plane finds there what it mirrors at its
+//! own place, blurred by the lobe and by how far behind the mirror that is: levels of detail of the picture are the
+//! blur. Where the picture is empty the sky is mirrored.
 
 use crate::draw::triangles::DrawnSurface;
 use crate::draw::{Antialias, Draw, DrawnViewport, PictureLights};

@@ -271,7 +271,7 @@ pub struct Draw {
     pub batch_triangles: u32,
     /// Whether [`Draw::make`] has made the pipelines of the scene.
     pub is_made: bool,
-    /// Pass "pixel light", which comes first where pixels evaluate sharp lights.
+    /// Pass "pixel light", which comes before where pixels evaluate sharp lights.
     light: Option<LightImages>,
     /// Pass "smooth", which follows where outlines are smoothed.
     pub smooth: Option<Smooth>,
@@ -330,7 +330,7 @@ impl Draw {
         light.and(mirrors).and(triangles).and(grid)
     }
 
-    /// Device memory of a pixel in the images of [`Draw::new`], bytes; `by_pixel` where pixels evaluate sharp lights.
+    /// Device memory of a pixel in the images of [`Draw::new`] but those of mirrors, bytes; `by_pixel` where pixels evaluate sharp lights.
     pub fn pixel_bytes(device: &Device, antialias: Antialias, by_pixel: bool) -> u64 {
         let samples = u64::from(antialias.samples(device));
         let colors = 1 + u64::from(antialias == Antialias::Outlines) + if samples > 1 { samples } else { 0 };
@@ -368,8 +368,8 @@ impl Draw {
         colors.chain([(&self.depth, Access::DepthWrite)])
     }
 
-    /// Draws all viewports, one after the other, over a background of one colour and alpha. Radiance above `white` is brought
-    /// down to it, hue kept. Between the render passes of a large picture stand barriers of the pass's own.
+    /// Draws all viewports, one after the other, over a background of one colour and alpha. Radiance above `white` is
+    /// brought down to it, hue kept. Between the render passes of a large picture stand barriers of the pass's own.
     pub fn record<'r>(
         &'r self,
         commands: &mut Commands<'r>,

@@ -129,9 +129,9 @@ pub struct DrawnSurface {
 pub enum Detail {
     /// Nothing: its vertices reflect.
     Rough,
-    /// The sky.
+    /// The sky, and what it mirrors.
     Mirror,
-    /// The sky, and textures of its gloss, normals and emission.
+    /// The same, and textures of its gloss, normals and emission.
     Textured,
 }
 

@@ -26,7 +26,8 @@ pub struct Texture {
 }
 
 impl Texture {
-    /// Uploads the levels, of which the nearest is sampled, each half as large as the one before, rounded down. `wrap` says how it goes on along u and v.
+    /// Uploads the levels, of which the nearest is sampled, each half as large as the one before, rounded down. `wrap`
+    /// says how it goes on along u and v.
     pub fn new(
         device: &Arc<Device>,
         name: &str,

@@ -1,6 +1,6 @@
 // Axes of a surface from its unit normal, which is the last: Duff et al., Building an Orthonormal Basis, Revisited,
-// JCGT 6(1), 2017. Where they are to find a place in a map of a vertex the normal must be the mesh's own, in the object's
-// frame; the axes may then be turned to any other.
+// JCGT 6(1), 2017. To find a place in a vertex's map the normal must be the mesh's own, in the object's frame; the axes
+// may then be turned to any other.
 mat3 surface_axes(vec3 normal) {
     float s = normal.z >= 0.0 ? 1.0 : -1.0;
     float a = -1.0 / (s + normal.z);

@@ -115,12 +115,16 @@ impl Edges {
     }
 }
 
+/// How far within the picture's four sides, and in front of the eye, a place in clip coordinates lies.
+pub(crate) fn within_picture(c: DVec4) -> [f64; 5] {
+    [c.w - 1e-6, c.w - c.x, c.w + c.x, c.w - c.y, c.w + c.y]
+}
+
 /// The part of a segment in clip coordinates that lies in front of the eye and within the picture.
 fn clipped([from, to]: [DVec4; 2]) -> Option<[DVec4; 2]> {
-    let sides = |c: DVec4| [c.w - 1e-6, c.w - c.x, c.w + c.x, c.w - c.y, c.w + c.y];
     let mut first = 0.0;
     let mut last = 1.0;
-    for (a, b) in sides(from).into_iter().zip(sides(to)) {
+    for (a, b) in within_picture(from).into_iter().zip(within_picture(to)) {
         if a < 0.0 && b < 0.0 {
             return None;
         }

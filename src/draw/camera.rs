@@ -32,14 +32,9 @@ pub fn near_m(camera: &Camera) -> f64 {
     1e-3 * camera.eye.as_dvec3().distance(camera.target.as_dvec3())
 }
 
-/// Half the height of the picture at a distance of 1.
-pub fn half_height(camera: &Camera) -> f64 {
-    (f64::from(camera.fov_deg).to_radians() / 2.0).tan()
-}
-
 /// Distance from the eye to a corner of the near plane's part in the picture, metres.
 pub fn near_corner_m(camera: &Camera, aspect: f64) -> f64 {
-    let high = half_height(camera);
+    let high = camera.half_height();
     near_m(camera) * (1.0 + high * high * (1.0 + aspect * aspect)).sqrt()
 }
 

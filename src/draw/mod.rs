@@ -330,7 +330,8 @@ impl Draw {
         light.and(mirrors).and(triangles).and(grid)
     }
 
-    /// Device memory of a pixel in the images of [`Draw::new`] but those of mirrors, bytes; `by_pixel` where pixels evaluate sharp lights.
+    /// Device memory of a pixel in the images of [`Draw::new`] but those of mirrors, bytes; `by_pixel` where pixels
+    /// evaluate sharp lights.
     pub fn pixel_bytes(device: &Device, antialias: Antialias, by_pixel: bool) -> u64 {
         let samples = u64::from(antialias.samples(device));
         let colors = 1 + u64::from(antialias == Antialias::Outlines) + if samples > 1 { samples } else { 0 };

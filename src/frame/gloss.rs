@@ -93,7 +93,8 @@ impl Frame {
         if self.reflections.is_none() {
             return Ok(());
         }
-        let sights = if self.options.skip.hidden { self.sights(placements, viewports) } else { None };
+        let sights =
+            if self.options.skip.hidden { self.sights(placements, &self.lit_cameras(viewports)) } else { None };
         let Some(reflections) = &self.reflections else { return Ok(()) };
         let eye = self.scene.data.camera.eye;
         let mut entities = vec![GlossEntity::default(); placements.len()];

@@ -3,9 +3,10 @@
 
 use super::viewport::Viewport;
 use super::{Frame, gloss};
+use crate::asset::edges::within_picture;
 use crate::asset::mesh::Mesh;
+use crate::draw::DrawnViewport;
 use crate::draw::triangles::Detail;
-use crate::draw::{DrawnViewport, camera};
 use crate::gloss::{PIXEL_ROUGHNESS, brdf};
 use crate::layout::GlossEntity;
 use crate::lists::sight::SightCamera;
@@ -96,12 +97,10 @@ fn flat_faces(mesh: &Mesh) -> Vec<([DVec3; 4], DVec3)> {
 /// The share of a picture that a polygon covers.
 fn share_of_picture(clip_from_world: DMat4, corners: [DVec3; 4]) -> f64 {
     let mut polygon: Vec<DVec4> = corners.iter().map(|corner| clip_from_world * corner.extend(1.0)).collect();
-    // Within the picture's sides, and in front of the eye.
-    let inside: [fn(&DVec4) -> f64; 5] = [|p| p.w - p.x, |p| p.w + p.x, |p| p.w - p.y, |p| p.w + p.y, |p| p.w - 1e-6];
-    for side in inside {
+    for side in 0..5 {
         let mut kept = Vec::with_capacity(polygon.len() + 1);
         for (a, b) in polygon.iter().zip(polygon.iter().cycle().skip(1)) {
-            let [from, to] = [side(a), side(b)];
+            let [from, to] = [within_picture(*a)[side], within_picture(*b)[side]];
             if from >= 0.0 {
                 kept.push(*a);
             }
@@ -157,7 +156,8 @@ impl Frame {
             return Vec::new();
         }
         let seen = self.camera([viewport.area[2], viewport.area[3]]);
-        let mut found: Vec<(Mirror, f64)> = Vec::new();
+        // Planes, the entities that have faces there, and the share of the picture that these reflect.
+        let mut found: Vec<(DVec4, Vec<usize>, f64)> = Vec::new();
         for face in &self.mirror_faces {
             let placement = &placements[face.entity];
             let corners = face.corners.map(|corner| placement.point(corner));
@@ -174,33 +174,32 @@ impl Frame {
             let f0 = brdf::facing(&of, entity.albedo.as_dvec3()).element_sum() / 3.0;
             let reflectance = f0 + (1.0 - f0) * brdf::grazing(height_m / distance_m);
             let score = reflectance * share_of_picture(seen.clip_from_world, corners);
-            let same = |(mirror, _): &&mut (Mirror, f64)| {
-                let off = mirror.plane.dot(middle.extend(1.0)).abs();
-                (mirror.plane - plane).truncate().length() < SAME_PLANE && off < SAME_PLANE * height_m
+            let same = |(other, ..): &&mut (DVec4, Vec<usize>, f64)| {
+                let off = other.dot(middle.extend(1.0)).abs();
+                (*other - plane).truncate().length() < SAME_PLANE && off < SAME_PLANE * height_m
             };
             match found.iter_mut().find(same) {
-                Some((mirror, sum)) => {
+                Some((_, entities, sum)) => {
                     *sum += score;
-                    mirror.entities.push(face.entity);
+                    entities.push(face.entity);
                 }
-                None if score > 0.0 => {
-                    let mirror = Mirror::new(&seen, plane, mirrors.part);
-                    found.push((Mirror { entities: vec![face.entity], ..mirror }, score));
-                }
+                None if score > 0.0 => found.push((plane, vec![face.entity], score)),
                 None => {}
             }
         }
-        found.sort_by(|(_, a), (_, b)| b.total_cmp(a));
+        found.sort_by(|(_, _, a), (_, _, b)| b.total_cmp(a));
         // An entity is one mirror, the one that is seen best.
         let mut taken = HashSet::new();
-        for (mirror, _) in &mut found {
-            mirror.entities.retain(|entity| taken.insert(*entity));
-        }
-        found.retain(|(mirror, _)| !mirror.entities.is_empty());
+        found.iter_mut().for_each(|(_, entities, _)| entities.retain(|entity| taken.insert(*entity)));
+        found.retain(|(_, entities, _)| !entities.is_empty());
         // None comes or goes in a step.
-        let least = found.get(mirrors.count()).map_or(0.0, |(_, score)| *score).max(LEAST_SHARE);
-        let shown = found.into_iter().filter(|(_, score)| *score > least).take(mirrors.count());
-        shown.map(|(mirror, score)| Mirror { share: ((score / least - 1.0) / FADE).min(1.0), ..mirror }).collect()
+        let least = found.get(mirrors.count()).map_or(0.0, |(.., score)| *score).max(LEAST_SHARE);
+        let shown = found.into_iter().filter(|(.., score)| *score > least).take(mirrors.count());
+        let mirror = |(plane, entities, score): (DVec4, Vec<usize>, f64)| {
+            let share = ((score / least - 1.0) / FADE).min(1.0);
+            Mirror { entities, share, ..Mirror::new(&seen, plane, mirrors.part) }
+        };
+        shown.map(mirror).collect()
     }
 
     /// What each mirror of the picture that was prepared last shows.
@@ -242,7 +241,7 @@ impl Frame {
         for (number, mirror) in self.picture.mirrors.iter().enumerate() {
             let [left, _, part_width, part_height] = of_picture.area(number).map(f64::from);
             let across = part_width * of_picture.count() as f64;
-            let focal_px = 0.5 * part_height / camera::half_height(camera);
+            let focal_px = 0.5 * part_height / camera.half_height();
             let plane = mirror.plane.truncate().extend(mirror.plane.dot(eye.extend(1.0)));
             for &entity in &mirror.entities {
                 entities[entity].mirror_plane = plane.as_vec4().to_array();
@@ -264,6 +263,7 @@ pub(super) fn count(faces: &[Face]) -> u32 {
 mod tests {
     use super::*;
     use crate::asset::generate::{cuboid, sphere};
+    use crate::draw::camera;
     use crate::scene::Camera;
 
     fn seen() -> SightCamera {

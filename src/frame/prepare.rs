@@ -11,7 +11,7 @@ use crate::error::Result;
 use crate::gpu::{Device, TexelView, Upload};
 use crate::layout::{self, CLUSTER_FORMAT, ENTRY_FORMAT};
 use crate::lists::incremental::{ClusterLists, Dirty, Merged};
-use crate::lists::sight::Sight;
+use crate::lists::sight::{Sight, SightCamera};
 use crate::merge::Merge;
 use crate::merge::variant::{MergePermutation, Reads};
 use crate::scene::Placement;
@@ -97,7 +97,11 @@ impl Frame {
     /// The dirty clusters and their lists.
     fn prepare_merge(&mut self, placements: &[Placement], viewports: &[Viewport]) -> Result<()> {
         let state = self.state(placements);
-        let sights = self.sights(placements, viewports);
+        let mut cameras = self.lit_cameras(viewports);
+        if !cameras.is_empty() {
+            cameras.extend(self.picture.mirrors.iter().map(|mirror| mirror.camera));
+        }
+        let sights = self.sights(placements, &cameras);
         let work = &mut self.work;
         if !std::mem::replace(work.recorded.get_mut(), false) {
             work.lists.forget();
@@ -156,14 +160,14 @@ impl Frame {
         self.picture.lines.write(&strips)
     }
 
-    /// How each entity is seen in each of the viewports that show merged light; `None` where none does, and light is
-    /// for others to read.
-    pub(super) fn sights(&self, placements: &[Placement], viewports: &[Viewport]) -> Option<Vec<Vec<Sight>>> {
+    /// The cameras of the viewports that show merged light.
+    pub(super) fn lit_cameras(&self, viewports: &[Viewport]) -> Vec<SightCamera> {
         let shown = viewports.iter().filter(|viewport| viewport.radiosity == RadiositySource::Merged);
-        let mut cameras: Vec<_> = shown.map(|viewport| self.camera([viewport.area[2], viewport.area[3]])).collect();
-        if !cameras.is_empty() {
-            cameras.extend(self.picture.mirrors.iter().map(|mirror| mirror.camera));
-        }
+        shown.map(|viewport| self.camera([viewport.area[2], viewport.area[3]])).collect()
+    }
+
+    /// How each entity is seen by each of some cameras; `None` where there are none, and light is for others to read.
+    pub(super) fn sights(&self, placements: &[Placement], cameras: &[SightCamera]) -> Option<Vec<Vec<Sight>>> {
         let of = |(index, placement)| cameras.iter().map(|camera| self.sight(camera, index, placement)).collect();
         (!cameras.is_empty()).then(|| placements.iter().enumerate().map(of).collect())
     }

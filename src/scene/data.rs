@@ -118,6 +118,11 @@ impl Camera {
         check("camera", self)
     }
 
+    /// Half the height of the picture at a distance of 1.
+    pub(crate) fn half_height(&self) -> f64 {
+        (f64::from(self.fov_deg).to_radians() / 2.0).tan()
+    }
+
     /// The direction that points up in the picture: +y, or -z for a camera that looks straight up or down.
     pub fn up(&self) -> Vec3 {
         let ahead = (self.target.as_dvec3() - self.eye.as_dvec3()).normalize();

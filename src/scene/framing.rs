@@ -102,7 +102,7 @@ mod tests {
         let ahead = (camera.target.as_dvec3() - eye).normalize();
         let right = ahead.cross(DVec3::Y).normalize();
         let up = right.cross(ahead);
-        let slope = (f64::from(camera.fov_deg).to_radians() / 2.0).tan();
+        let slope = camera.half_height();
         let share = |axis: DVec3, slope: f64| {
             points.iter().map(|p| (*p - eye).dot(axis).abs() / (*p - eye).dot(ahead) / slope).fold(0.0, f64::max)
         };

@@ -52,6 +52,13 @@ fn by_bouncing_rays(scene: &Scene, rays: u32, bounces: u32) -> RayPicture {
     pixels::picture(&world, SIZE, false, &RayCast { rays, bounces, runs: 2, ..RayCast::default() }, &|_| ())
 }
 
+/// Pictures with one bounce: the frame's, and that of rays.
+fn bounced_once(gpu: &Gpu, scene: &Scene) -> [Vec<f32>; 2] {
+    let bake = bake::Options { groups: true, ..bake::Options::default() };
+    let found = picture(gpu, scene, frame::Options { bounces: Bounces::One, bake, ..options() });
+    [found, by_bouncing_rays(scene, 256, 1).linear]
+}
+
 /// Relative RMS over the pixels where the scene shows a surface: its background is black.
 fn error(found: &[f32], wanted: &[f32]) -> f64 {
     relative_rms(found.iter().zip(wanted).map(|(found, wanted)| (f64::from(*found), f64::from(*wanted))))
@@ -160,11 +167,9 @@ fn near_things_are_reflected_where_they_stand() {
         ]
         "#,
     );
-    let bake = bake::Options { groups: true, ..bake::Options::default() };
-    let found = picture(&gpu, &scene, frame::Options { bounces: Bounces::One, bake, ..options() });
-    let wanted = by_bouncing_rays(&scene, 256, 1);
+    let [found, wanted] = bounced_once(&gpu, &scene);
     let floor = 3 * (SIZE[0] * SIZE[1] / 2) as usize..;
-    let error = error(&found[floor.clone()], &wanted.linear[floor]);
+    let error = error(&found[floor.clone()], &wanted[floor]);
     report(&format!("{error:.4}"));
     // 0.26 where its vertices look along their links, 0.38 by the mean of these.
     assert!(error < 0.2, "{error}");
@@ -190,10 +195,8 @@ fn flat_surfaces_mirror_what_moves() {
         ]
         "#,
     );
-    let bake = bake::Options { groups: true, ..bake::Options::default() };
-    let found = picture(&gpu, &scene, frame::Options { bounces: Bounces::One, bake, ..options() });
-    let wanted = by_bouncing_rays(&scene, 256, 1);
-    let error = error(&found, &wanted.linear);
+    let [found, wanted] = bounced_once(&gpu, &scene);
+    let error = error(&found, &wanted);
     report(&format!("{error:.4}"));
     assert!(error < 0.15, "{error}");
 }

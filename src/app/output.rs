@@ -8,6 +8,7 @@ use std::cell::RefCell;
 use std::io::{IsTerminal, Write};
 use std::path::Path;
 use std::sync::{Mutex, PoisonError};
+use std::time::Instant;
 
 /// The first error that kept results from being written.
 static UNWRITTEN: Mutex<Option<std::io::Error>> = Mutex::new(None);
@@ -69,11 +70,13 @@ pub fn start_log(global: &Global) {
         (false, _) => "debug",
     };
     let environment = env_logger::Env::default().default_filter_or(level);
-    let line = |buffer: &mut env_logger::fmt::Formatter, record: &log::Record<'_>| {
+    let start = Instant::now();
+    let line = move |buffer: &mut env_logger::fmt::Formatter, record: &log::Record<'_>| {
         let level = record.level();
         let style = buffer.default_level_style(record.level());
+        let seconds = start.elapsed().as_secs_f64();
         let message = one_line(&record.args().to_string());
-        writeln!(buffer, "[{style}{level:<5}{style:#} {}] {message}", record.target())
+        writeln!(buffer, "[{style}{level:<5}{style:#} {seconds:.2} s {}] {message}", record.target())
     };
     let _ = env_logger::Builder::from_env(environment).format(line).try_init();
 }

@@ -114,12 +114,14 @@ impl Frame {
         limits::check(device, scene, &needs)?;
         PictureMemory::new(device, &options).check(device)?;
         let mut baked = bake::ensure(baker, cache, scene, &needs, progress)?;
+        log::debug!("all that is baked is there");
         let mut near = std::mem::take(&mut baked.near);
         let mut scene = scene.clone();
         let links: Vec<_> = baked.surface_of.iter().map(|&surface| baked.surfaces[surface].links.clone()).collect();
         let rigid = std::mem::take(&mut baked.rigid);
         scene.surfaces = baked.surface_of.iter().map(|&surface| baked.surfaces[surface].mesh.clone()).collect();
         let buffers = SceneBuffers::new(device, &scene, &options.bake, baked)?;
+        log::debug!("it is on the device");
         let entity_count = scene.entities.len();
         let wanted = options.variant.unwrap_or_else(|| calibrate::best_known(device));
         let methods = methods(&scene, options.lights);
@@ -198,6 +200,7 @@ impl Frame {
             bounce.set_albedos(&albedos(&scene))?;
             radiosity.keep_direct()?;
         }
+        log::debug!("passes that light are made");
         let entity_room = entity_count.max(permutation.entity_limit as usize);
         let mut sky = SkyLight::new(device, options.bake.bands, buffers.volume_quads())?;
         sky.write(&scene, options.bake.bands)?;

@@ -126,7 +126,7 @@ impl Buffer {
         // freeing.
         let mapped = unsafe {
             device.handle.bind_buffer_memory(buffer, memory.handle, 0).checked("vkBindBufferMemory", name)?;
-            if memory.host_coherent {
+            if memory.host_coherent && !(kind == BufferKind::Device && device.maps_no_device_memory()) {
                 let pointer = device
                     .handle
                     .map_memory(memory.handle, 0, vk::WHOLE_SIZE, vk::MemoryMapFlags::empty())
@@ -156,6 +156,9 @@ impl Buffer {
     /// Writes `data` at a byte offset (a multiple of 4), directly or through a staging buffer as the memory allows. It
     /// first waits for all recordings in flight.
     pub fn fill<T: Pod>(&mut self, offset_bytes: u64, data: &[T]) -> Result<()> {
+        if data.is_empty() {
+            return Ok(()); // Vulkan copies no empty range
+        }
         if self.mapped.is_some() {
             self.device().settle();
             self.write(offset_bytes, data);

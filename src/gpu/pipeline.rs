@@ -8,6 +8,7 @@ use super::shader::{Shader, Stage};
 use crate::error::{Error, Result};
 use ash::vk;
 use std::sync::Arc;
+use std::time::Instant;
 
 /// Descriptor set layout and pipeline layout, used by both kinds of pipeline.
 pub(super) struct Layout {
@@ -135,6 +136,14 @@ impl Drop for Module<'_> {
     }
 }
 
+/// What `made` gives, with a line in the log of how long the driver took for it.
+fn timed<T>(name: &str, made: impl FnOnce() -> T) -> T {
+    let start = Instant::now();
+    let outcome = made();
+    log::debug!("pipeline {name}: {:.0} ms", start.elapsed().as_secs_f64() * 1e3);
+    outcome
+}
+
 /// One compute shader, ready to dispatch.
 pub struct ComputePipeline {
     /// Before its layout.
@@ -154,10 +163,12 @@ impl ComputePipeline {
             .module(module.1)
             .name(c"main");
         let create = vk::ComputePipelineCreateInfo::default().stage(stage).layout(layout.pipeline.handle);
-        // SAFETY: everything that `create` points to outlives the call; destroyed by `Owned`.
-        let handle = unsafe { device.handle.create_compute_pipelines(device.pipeline_cache, &[create], None) }
-            .map_err(|(_, code)| code)
-            .checked("vkCreateComputePipelines", name)?[0];
+        let handle = timed(name, || {
+            // SAFETY: everything that `create` points to outlives the call; destroyed by `Owned`.
+            unsafe { device.handle.create_compute_pipelines(device.pipeline_cache, &[create], None) }
+                .map_err(|(_, code)| code)
+                .checked("vkCreateComputePipelines", name)
+        })?[0];
         let handle = Owned::new(device, name, handle, ash::Device::destroy_pipeline);
         Ok(ComputePipeline { handle, layout, local_size, name: name.into() })
     }
@@ -264,10 +275,12 @@ impl GraphicsPipeline {
             .dynamic_state(&dynamic)
             .layout(layout.pipeline.handle)
             .push_next(&mut rendering);
-        // SAFETY: everything that `create` points to outlives the call; destroyed by `Owned`.
-        let handle = unsafe { device.handle.create_graphics_pipelines(device.pipeline_cache, &[create], None) }
-            .map_err(|(_, code)| code)
-            .checked("vkCreateGraphicsPipelines", name)?[0];
+        let handle = timed(name, || {
+            // SAFETY: everything that `create` points to outlives the call; destroyed by `Owned`.
+            unsafe { device.handle.create_graphics_pipelines(device.pipeline_cache, &[create], None) }
+                .map_err(|(_, code)| code)
+                .checked("vkCreateGraphicsPipelines", name)
+        })?[0];
         let handle = Owned::new(device, name, handle, ash::Device::destroy_pipeline);
         Ok(GraphicsPipeline { handle, layout, inputs, state, name: name.into() })
     }

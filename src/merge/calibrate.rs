@@ -27,6 +27,9 @@ const VERTICES: u32 = 16_384;
 const OCCLUDERS: u32 = 8;
 /// Timed runs of each variant, interleaved; the least counts, since noise only adds.
 const RUNS: u32 = 5;
+/// Share of the default's time that another variant may take at most to replace it: its shaders have to be compiled once
+/// more, and differences of a tenth are noise on a graphics card.
+const WORTH: f64 = 0.9;
 
 fn path(device: &Device) -> Option<PathBuf> {
     Some(device.cache_dir.as_ref()?.join(format!("calibration-{}.json", device.info.uuid)))
@@ -71,8 +74,10 @@ pub fn measure(device: &Arc<Device>, library: &Library) -> Result<Calibration> {
     let least = times.iter().map(|times| Some(times.as_ref()?.iter().copied().fold(f64::INFINITY, f64::min)));
     let milliseconds: Vec<(String, Option<f64>)> =
         VARIANTS.iter().map(|variant| variant.name.to_owned()).zip(least).collect();
-    let timed = milliseconds.iter().filter_map(|(name, ms)| Some((name, (*ms)?)));
-    let (fastest, _) = timed
+    let default = Variant::sane_default(device).name;
+    let weight = |name: &str| if name == default { WORTH } else { 1.0 };
+    let weighed = milliseconds.iter().filter_map(|(name, ms)| Some((name, weight(name) * (*ms)?)));
+    let (fastest, _) = weighed
         .min_by(|a, b| a.1.total_cmp(&b.1))
         .ok_or_else(|| Error::Failed("the driver compiles no variant of the merge".into()))?;
     Ok(Calibration {

@@ -99,9 +99,19 @@ vec3 glossy(uint index, vec3 base, vec3 light, vec4 share, vec2 uv, float within
     vec3 through = found.facing, nearby = found.grazing;
 #if MIRRORED
     float of_mirror = mirror_share(entity, n, from_eye);
+#if PROBES
+    vec3 ray = reflect(-view.toward, view.normal);
+    float turn = max(length(dFdx(ray)), length(dFdy(ray)));
+    bool is_probe = entity.probe.w > 0.0;
+    of_mirror = is_probe ? entity.mirror_place.w : of_mirror;
+#endif
     if (of_mirror > 0.0) {
         vec3 tilt = view.normal - n;
         vec4 mirrored = mirrored_light(entity, sqrt(view.alpha * view.alpha + dot(tilt, tilt)));
+#if PROBES
+        vec4 probed = probed_light(entity, view.alpha, from_eye, ray, turn);
+        mirrored = is_probe ? probed : mirrored;
+#endif
         through = mix(through, vec3((1.0 - mirrored.a) * entity.sky_scale), of_mirror);
         nearby = mix(nearby, mirrored.rgb, of_mirror);
     }

@@ -183,6 +183,10 @@ shared_struct! {
         /// lobe of slope 1. Factor on what depth leaves of 1, over that of a pixel's view depth, that gives the share of
         /// the way from the mirror's eye that lies behind the mirror.
         mirror_view: [f32; 4],
+        /// Of a curved surface, which has no plane: the place of its probe from the eye by the world's axes, and the edge
+        /// of one of six pictures in texels. Its view is the left edge of its part, as above the radius of a lobe, and the
+        /// distance of the pictures' near plane, metres.
+        probe: [f32; 4],
     }
 }
 

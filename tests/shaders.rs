@@ -12,6 +12,7 @@ use shadow_fields::bounce::boxes::hidden_row;
 use shadow_fields::bounce::movers::{distant_row, movers_row, outgoing_row};
 use shadow_fields::bounce::{bounce_row, runs_row};
 use shadow_fields::draw::grid::DrawGrid;
+use shadow_fields::draw::mirror::Mirrored;
 use shadow_fields::draw::pixel_light::{LightImages, Receiver, Way};
 use shadow_fields::draw::smooth::Smooth;
 use shadow_fields::draw::triangles::{Detail, DrawTriangles, Form, Look};
@@ -121,11 +122,9 @@ fn drawing() -> Vec<ShaderPermutation> {
     let ways = [None, Some(&sharp[0]), Some(&sharp[1])];
     let grids = [false, true].map(DrawGrid::rows).concat();
     let glossy = ways.into_iter().flat_map(|highlights| {
-        [Detail::Rough, Detail::Mirror, Detail::Textured].map(|detail| Look::Glossy {
-            highlights,
-            detail,
-            mirrors: true,
-        })
+        let mirrored = if highlights.is_some() { Mirrored::PlanesAndBalls } else { Mirrored::Planes };
+        let details = [Detail::Rough, Detail::Mirror, Detail::Textured];
+        details.map(|detail| Look::Glossy { highlights, detail, mirrored })
     });
     let looks: Vec<Look<'_>> = [Look::Plain, Look::Painted].into_iter().chain(glossy).collect();
     let triangles = looks.iter().flat_map(|&look| {

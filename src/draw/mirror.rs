@@ -1,9 +1,13 @@
-//! Pass "mirror": what flat glossy surfaces mirror.
+//! Pass "mirror": what glossy surfaces mirror.
 //!
 //! For each plane that mirrors, the scene is drawn as the eye's mirror image sees it, by the light of vertices, into a
 //! part of one picture, at half the size on software devices. A pixel of the plane finds there what it mirrors at its
 //! own place, blurred by the lobe and by how far behind the mirror that is: levels of detail of the picture are the
 //! blur. Where the picture is empty the sky is mirrored.
+//!
+//! A curved surface has a probe: six pictures from its middle of what stands around it, without it, in its part of that
+//! picture. A pixel follows the mirrored ray from its own place: the ball about the middle through what it would meet
+//! tells where it does, three times over. In a probe a surface does not see itself.
 
 use crate::draw::triangles::DrawnSurface;
 use crate::draw::{Antialias, Draw, DrawnViewport, PictureLights};
@@ -28,7 +32,24 @@ pub const FLAT: f64 = 0.999;
 /// What half floats hold. Radiance above is brought down to it, as blur would spread what is infinite.
 const MOST_RADIANCE: f32 = 65_504.0;
 
-/// What planes mirror, in one picture.
+/// Half of the width of a probe's picture over the tangent of the angle that it shows to each side: less than 1, so that
+/// blur at the edge of a picture finds what the next one shows.
+pub const ZOOM: f64 = 0.8;
+/// Texels of the finest level along a texel of the coarsest that probes read.
+const PROBE_COARSEST: u32 = 16;
+/// Least width of its pictures, where there is room.
+const LEAST_SIDE: u32 = 64;
+
+/// What may be mirrors in pictures of a scene.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Mirrored {
+    Nothing,
+    Planes,
+    /// Curved surfaces, too.
+    PlanesAndBalls,
+}
+
+/// What mirrors show, in one picture.
 pub struct Mirrors {
     draw: Draw,
     /// What depth leaves of 1.
@@ -50,7 +71,7 @@ impl Mirrors {
             pixels.div_ceil(texel_px).next_multiple_of(COARSEST).min(most / COARSEST * COARSEST)
         };
         let part = [fit(size[0], most / count), fit(size[1], most)];
-        let lights = PictureLights { pixels: None, highlights: None, mirrors: 0 };
+        let lights = PictureLights { pixels: None, highlights: None, mirrors: 0, probes: false };
         let draw = Draw::new(device, library, [count * part[0], part[1]], Antialias::None, lights)?;
         let shape = draw.picture.shape;
         let of_far = ImageShape { format: vk::Format::R16_SFLOAT, ..shape };
@@ -80,12 +101,24 @@ impl Mirrors {
         [mirror as u32 * width, 0, width, height]
     }
 
+    /// Width and height of each of the six pictures of a probe that is seen `texels` wide; 0 where parts are too small.
+    pub fn face_side(&self, texels: f64) -> u32 {
+        let most = (self.part[0] / 3).min(self.part[1] / 2) / PROBE_COARSEST * PROBE_COARSEST;
+        let wanted = texels.clamp(f64::from(LEAST_SIDE), f64::from(most.max(LEAST_SIDE))) as u32;
+        most.min(wanted.next_multiple_of(PROBE_COARSEST))
+    }
+
+    /// Left, top, width and height of one of a probe's pictures, which lie in two rows of its part.
+    pub fn face_area(&self, mirror: usize, face: usize, side: u32) -> [u32; 4] {
+        [mirror as u32 * self.part[0] + face as u32 % 3 * side, face as u32 / 3 * side, side, side]
+    }
+
     pub(super) fn make(&self, surfaces: &HashSet<DrawnSurface>, grids: bool) -> Result<()> {
         let diffuse = surfaces.iter().map(|surface| DrawnSurface { detail: None, ..*surface }).collect();
         self.draw.make(&diffuse, grids)
     }
 
-    /// Draws what the mirrors show, one viewport each, and makes it ready to be sampled.
+    /// Draws what the mirrors show and makes it ready to be sampled.
     pub fn record<'r>(&'r self, commands: &mut Commands<'r>, viewports: &[DrawnViewport<'r>]) -> Result<()> {
         if viewports.is_empty() {
             // They are bound, and not read.
@@ -93,7 +126,8 @@ impl Mirrors {
             return Ok(());
         }
         // The parts in use, and what filters of the coarsest level read beside them.
-        let width = (viewports.len() as u32 * self.part[0] + COARSEST).min(self.far.shape.width);
+        let end = viewports.iter().map(|viewport| viewport.area[0] / self.part[0] + 1).max().unwrap_or(0);
+        let width = (end * self.part[0] + COARSEST).min(self.far.shape.width);
         for (image, access) in self.draw.attachments() {
             commands.image_barrier(image, None, access);
         }

@@ -16,7 +16,7 @@ pub mod triangles;
 use crate::asset::grid::Grid;
 use crate::asset::mesh::Mesh;
 use crate::draw::grid::{DrawGrid, DrawnGrid};
-use crate::draw::mirror::Mirrors;
+use crate::draw::mirror::{Mirrored, Mirrors};
 use crate::draw::pixel_light::{ByPixel, LightImages, PixelLight, Receiver};
 use crate::draw::smooth::Smooth;
 use crate::draw::triangles::{Detail, DrawTriangles, DrawnLayer, DrawnSurface, DrawnTriangles};
@@ -224,8 +224,20 @@ pub struct PictureLights {
     pub pixels: Option<SharpPermutation>,
     /// For highlights, where the scene has such lights.
     pub highlights: Option<SharpPermutation>,
-    /// How many planes of the scene may be mirrors at a time.
+    /// How many mirrors there may be at a time.
     pub mirrors: u32,
+    /// Whether some of them may be curved.
+    pub probes: bool,
+}
+
+impl PictureLights {
+    fn mirrored(&self) -> Mirrored {
+        match (self.mirrors, self.probes) {
+            (0, _) => Mirrored::Nothing,
+            (_, false) => Mirrored::Planes,
+            (_, true) => Mirrored::PlanesAndBalls,
+        }
+    }
 }
 
 /// What pipelines are made of that draw into the same images.
@@ -294,7 +306,7 @@ impl Draw {
         let maker = PipelineMaker { device: device.clone(), library: library.clone(), state };
         let light = |sharp| LightImages::new(device, library, [width, height], sharp);
         Ok(Draw {
-            triangles: DrawTriangles::new(maker.clone(), lights.highlights, lights.mirrors > 0),
+            triangles: DrawTriangles::new(maker.clone(), lights),
             grid: DrawGrid::new(maker),
             samples: (samples > 1)
                 .then(|| Image::new(device, "draw samples", ImageShape { samples, ..shape }))

@@ -1,7 +1,8 @@
 //! Part of pass "draw": meshes by their triangles.
 
 use crate::asset::mesh::Mesh;
-use crate::draw::mirror::{self, Mirrors};
+use crate::draw::PictureLights;
+use crate::draw::mirror::{self, Mirrored, Mirrors};
 use crate::draw::pixel_light::{LIGHT_BINDING, shown_light, texels};
 use crate::draw::{DrawnEntity, DrawnPaint, DrawnViewport, EntityPush, PipelineMaker, made_once};
 use crate::error::Result;
@@ -110,7 +111,7 @@ pub enum Look<'p> {
     /// Textures or tints vary the reflectance.
     Painted,
     /// It may be painted, and reflects; highlights are of sharp lights that are evaluated so, if there are any.
-    Glossy { highlights: Option<&'p SharpPermutation>, detail: Detail, mirrors: bool },
+    Glossy { highlights: Option<&'p SharpPermutation>, detail: Detail, mirrored: Mirrored },
 }
 
 /// What decides which pipelines draw a surface of triangles.
@@ -149,13 +150,15 @@ impl Look<'_> {
     /// The macros of both stages.
     fn macros(self, row: ShaderPermutation) -> ShaderPermutation {
         let row = row.define("PAINTED", !matches!(self, Look::Plain));
-        let Look::Glossy { highlights, detail, mirrors } = self else { return row.define("GLOSS", false) };
+        let Look::Glossy { highlights, detail, mirrored } = self else { return row.define("GLOSS", false) };
         gloss::macros(row)
             .define("GLOSS", true)
             .define("GLOSS_BINDING", GLOSS_BINDING)
             .define("HIGHLIGHTS", highlights.is_some())
             .define("MIRROR", detail != Detail::Rough)
-            .define("MIRRORED", mirrors && detail != Detail::Rough)
+            .define("MIRRORED", mirrored != Mirrored::Nothing && detail != Detail::Rough)
+            .define("PROBES", mirrored == Mirrored::PlanesAndBalls)
+            .number("PROBE_ZOOM", mirror::ZOOM)
             .define("MIRROR_BINDING", MIRROR_BINDING)
             .number("MIRROR_SPREAD", mirror::SPREAD)
             .number("MIRROR_FLAT", mirror::FLAT)
@@ -199,15 +202,14 @@ pub struct DrawTriangles {
     maker: PipelineMaker,
     /// How the sharp lights are evaluated that glossy surfaces have highlights of.
     highlights: Option<SharpPermutation>,
-    /// Whether any surface may be a mirror.
-    mirrors: bool,
+    mirrored: Mirrored,
     /// By look and form; each is made where it is first drawn with.
     made: [[OnceLock<GraphicsPipeline>; Form::COUNT]; Look::COUNT],
 }
 
 impl DrawTriangles {
-    pub fn new(maker: PipelineMaker, highlights: Option<SharpPermutation>, mirrors: bool) -> Self {
-        DrawTriangles { maker, highlights, mirrors, made: Default::default() }
+    pub fn new(maker: PipelineMaker, lights: PictureLights) -> Self {
+        DrawTriangles { maker, highlights: lights.highlights, mirrored: lights.mirrored(), made: Default::default() }
     }
 
     /// Makes what surfaces are drawn with, on all cores; `by_pixel` where pixels have light of their own.
@@ -252,7 +254,7 @@ impl DrawTriangles {
 
     fn look_of(&self, painted: bool, detail: Option<Detail>) -> Look<'_> {
         match detail {
-            Some(detail) => Look::Glossy { highlights: self.highlights.as_ref(), detail, mirrors: self.mirrors },
+            Some(detail) => Look::Glossy { highlights: self.highlights.as_ref(), detail, mirrored: self.mirrored },
             None if painted => Look::Painted,
             None => Look::Plain,
         }

@@ -1,11 +1,13 @@
-//! Planes that mirror: flat faces of glossy entities, the ones that a picture shows best, and the eye's mirror image
-//! behind each.
+//! What mirrors: planes of flat faces and curved surfaces of glossy entities, the ones that a picture shows best.
+//! Behind a plane stands the eye's mirror image; in the middle of what is curved stands a probe.
 
+use super::probe::{self, Probe};
 use super::viewport::Viewport;
 use super::{Frame, gloss};
 use crate::asset::edges::within_picture;
 use crate::asset::mesh::Mesh;
 use crate::draw::DrawnViewport;
+use crate::draw::mirror::ZOOM;
 use crate::draw::triangles::Detail;
 use crate::gloss::{PIXEL_ROUGHNESS, brdf};
 use crate::layout::GlossEntity;
@@ -21,6 +23,10 @@ const LEAST_SHARE: f64 = 5e-4;
 /// Least share of a mesh's surface in a face that may be a mirror, and how many faces of a mesh may be.
 const LEAST_FACE: f64 = 0.04;
 const MOST_FACES: usize = 8;
+/// A mesh with less than this share of its surface in flat faces is curved.
+const FLAT_MESH: f64 = 0.5;
+/// Half of the edge of a square that covers as much of a picture as what is curved, in bounding radii.
+const SEEN_RADIUS: f64 = 0.7;
 /// Faces whose normals and offsets, over the eye's distance from the plane, differ by less are one mirror.
 const SAME_PLANE: f64 = 1e-3;
 /// Distance from the plane, over the eye's, within which nothing is mirrored: that of the faces themselves.
@@ -36,37 +42,74 @@ pub(super) struct Face {
     normal: DVec3,
 }
 
-/// A plane that mirrors in the next picture.
+/// What may mirror in pictures of a scene.
+#[derive(Default)]
+pub(super) struct Reflectors {
+    faces: Vec<Face>,
+    /// Entities that are curved.
+    pub curved: Vec<usize>,
+}
+
+/// A mirror of the next picture.
 pub(super) struct Mirror {
-    pub camera: SightCamera,
-    /// Unit normal on the eye's side, and offset from the world's origin.
-    plane: DVec4,
+    shape: Shape,
     entities: Vec<usize>,
     /// Share of its picture in what it reflects: less than 1 for one that is hardly seen.
     share: f64,
+}
+
+enum Shape {
+    Plane(Plane),
+    Probe(Box<Probe>),
+}
+
+/// Where a mirror stands.
+#[derive(Clone, Copy)]
+enum Place {
+    /// Unit normal on the eye's side, and offset from the world's origin.
+    Plane(DVec4),
+    /// Centre and radius, metres.
+    Ball(DVec3, f64),
+}
+
+/// The eye's mirror image behind a plane.
+struct Plane {
+    camera: SightCamera,
+    /// Unit normal on the eye's side, and offset from the world's origin.
+    plane: DVec4,
     /// Distance of the eye from the plane, metres.
     height_m: f64,
     /// What a metre away from the plane takes from depth, times the view depth in metres.
     depth_step: f64,
 }
 
-/// The faces of a scene that may be mirrors.
-pub(super) fn faces(scene: &Scene) -> Vec<Face> {
+/// What of a scene may mirror.
+pub(super) fn reflectors(scene: &Scene) -> Reflectors {
     let glossy = scene.entities.iter().enumerate().filter(|(_, entity)| {
         let mirrors = matches!(gloss::detail(entity), Some(Detail::Mirror | Detail::Textured));
         mirrors && !entity.transparent && entity.gloss.is_some_and(|gloss| gloss.roughness < PIXEL_ROUGHNESS)
     });
     let mut of_mesh: HashMap<usize, Vec<([DVec3; 4], DVec3)>> = HashMap::new();
-    let mut out = Vec::new();
+    let mut is_curved: HashMap<usize, bool> = HashMap::new();
+    let mut out = Reflectors::default();
     for (entity, of) in glossy {
-        let flat = of_mesh.entry(of.mesh).or_insert_with(|| flat_faces(&scene.meshes[of.mesh]));
-        out.extend(flat.iter().map(|(corners, normal)| Face { entity, corners: *corners, normal: *normal }));
+        let mesh = &scene.meshes[of.mesh];
+        let flat = of_mesh.entry(of.mesh).or_insert_with(|| {
+            let (faces, share) = flat_faces(mesh);
+            is_curved.insert(of.mesh, share < FLAT_MESH && probe::is_outward(mesh));
+            faces
+        });
+        if is_curved[&of.mesh] {
+            out.curved.push(entity);
+        } else {
+            out.faces.extend(flat.iter().map(|(corners, normal)| Face { entity, corners: *corners, normal: *normal }));
+        }
     }
     out
 }
 
-/// Rectangles around the largest flat faces of a mesh, and their normals.
-fn flat_faces(mesh: &Mesh) -> Vec<([DVec3; 4], DVec3)> {
+/// Rectangles around the largest flat faces of a mesh, and their normals; and the share of its surface that is in them.
+fn flat_faces(mesh: &Mesh) -> (Vec<([DVec3; 4], DVec3)>, f64) {
     let (centre, radius_m) = mesh.bounding_sphere();
     let mut planes: HashMap<[i32; 4], (f64, DVec3, Vec<DVec3>)> = HashMap::new();
     for triangle in &mesh.triangles {
@@ -79,8 +122,10 @@ fn flat_faces(mesh: &Mesh) -> Vec<([DVec3; 4], DVec3)> {
         *area_m2 += 0.5 * twice.length();
         corners.extend([a, b, c]);
     }
-    let least = LEAST_FACE * mesh.area_m2();
+    let whole_m2 = mesh.area_m2();
+    let least = LEAST_FACE * whole_m2;
     let mut planes: Vec<_> = planes.into_iter().filter(|(_, (area_m2, ..))| *area_m2 > least).collect();
+    let flat_m2: f64 = planes.iter().map(|(_, (area_m2, ..))| area_m2).sum();
     planes.sort_by(|(a_key, (a, ..)), (b_key, (b, ..))| b.total_cmp(a).then(a_key.cmp(b_key)));
     let rectangle = |(_, (_, normal, corners)): ([i32; 4], (f64, DVec3, Vec<DVec3>))| {
         let (x, y) = normal.any_orthonormal_pair();
@@ -91,7 +136,7 @@ fn flat_faces(mesh: &Mesh) -> Vec<([DVec3; 4], DVec3)> {
         let at = |u: f64, v: f64| u * x + v * y + height * normal;
         ([at(low.x, low.y), at(high.x, low.y), at(high.x, high.y), at(low.x, high.y)], normal)
     };
-    planes.into_iter().take(MOST_FACES).map(rectangle).collect()
+    (planes.into_iter().take(MOST_FACES).map(rectangle).collect(), flat_m2 / whole_m2)
 }
 
 /// The share of a picture that a polygon covers.
@@ -123,6 +168,16 @@ fn reflection(plane: DVec4) -> DMat4 {
 }
 
 impl Mirror {
+    /// The cameras of its pictures.
+    pub(super) fn cameras(&self) -> &[SightCamera] {
+        match &self.shape {
+            Shape::Plane(plane) => std::slice::from_ref(&plane.camera),
+            Shape::Probe(probe) => &probe.cameras,
+        }
+    }
+}
+
+impl Plane {
     /// The mirror of a plane as a camera sees it; `part` is the size of its picture in pixels.
     fn new(seen: &SightCamera, plane: DVec4, part: [u32; 2]) -> Self {
         let height_m = plane.dot(seen.eye.extend(1.0));
@@ -144,21 +199,22 @@ impl Mirror {
         clip.z_axis = clip.w_axis - depth_step * above;
         let camera =
             SightCamera { clip_from_world: clip.transpose(), eye, near_m: seen.near_m, size: part, samples: false };
-        Mirror { camera, plane, entities: Vec::new(), share: 0.0, height_m, depth_step }
+        Plane { camera, plane, height_m, depth_step }
     }
 }
 
 impl Frame {
-    /// The planes that mirror in a picture of these viewports: none unless one shows light in all of it.
+    /// What mirrors in a picture of these viewports: nothing unless one shows light in all of it.
     pub(super) fn mirrors_of(&self, placements: &[Placement], viewports: &[Viewport]) -> Vec<Mirror> {
         let ([viewport], Some(mirrors)) = (viewports, &self.picture.draw.mirrors) else { return Vec::new() };
         if *viewport != self.whole() || self.reflections.is_none() {
             return Vec::new();
         }
         let seen = self.camera([viewport.area[2], viewport.area[3]]);
-        // Planes, the entities that have faces there, and the share of the picture that these reflect.
-        let mut found: Vec<(DVec4, Vec<usize>, f64)> = Vec::new();
-        for face in &self.mirror_faces {
+        let camera = &self.scene.data.camera;
+        // Mirrors, the entities that have faces there, and the share of the picture that these reflect.
+        let mut found: Vec<(Place, Vec<usize>, f64)> = Vec::new();
+        for face in &self.reflectors.faces {
             let placement = &placements[face.entity];
             let corners = face.corners.map(|corner| placement.point(corner));
             let normal = placement.turn() * face.normal;
@@ -169,12 +225,10 @@ impl Frame {
             if height_m < 1e-6 * distance_m {
                 continue;
             }
-            let entity = &self.scene.entities[face.entity];
-            let Some(of) = entity.gloss else { continue };
-            let f0 = brdf::facing(&of, entity.albedo.as_dvec3()).element_sum() / 3.0;
-            let reflectance = f0 + (1.0 - f0) * brdf::grazing(height_m / distance_m);
-            let score = reflectance * share_of_picture(seen.clip_from_world, corners);
-            let same = |(other, ..): &&mut (DVec4, Vec<usize>, f64)| {
+            let score =
+                self.reflectance(face.entity, height_m / distance_m) * share_of_picture(seen.clip_from_world, corners);
+            let same = |(place, ..): &&mut (Place, Vec<usize>, f64)| {
+                let Place::Plane(other) = place else { return false };
                 let off = other.dot(middle.extend(1.0)).abs();
                 (*other - plane).truncate().length() < SAME_PLANE && off < SAME_PLANE * height_m
             };
@@ -183,10 +237,22 @@ impl Frame {
                     *sum += score;
                     entities.push(face.entity);
                 }
-                None if score > 0.0 => found.push((plane, vec![face.entity], score)),
-                None => {}
+                None => found.push((Place::Plane(plane), vec![face.entity], score)),
             }
         }
+        let curved = self.reflectors.curved.iter().filter(|_| mirrors.face_side(f64::INFINITY) > 0);
+        for &entity in curved {
+            let centre = self.centre(entity, &placements[entity]);
+            let mesh = &self.buffers.meshes[self.scene.entities[entity].mesh];
+            let radius_m = mesh.radius_m * f64::from(placements[entity].scale);
+            let Some(toward) = (seen.eye - centre).try_normalize() else { continue };
+            let (x, y) = toward.any_orthonormal_pair();
+            let [x, y] = [x, y].map(|axis| SEEN_RADIUS * radius_m * axis);
+            let corners = [centre - x - y, centre + x - y, centre + x + y, centre - x + y];
+            let score = self.reflectance(entity, 0.5) * share_of_picture(seen.clip_from_world, corners);
+            found.push((Place::Ball(centre, radius_m), vec![entity], score));
+        }
+        found.retain(|(.., score)| *score > 0.0);
         found.sort_by(|(_, _, a), (_, _, b)| b.total_cmp(a));
         // An entity is one mirror, the one that is seen best.
         let mut taken = HashSet::new();
@@ -195,11 +261,27 @@ impl Frame {
         // None comes or goes in a step.
         let least = found.get(mirrors.count()).map_or(0.0, |(.., score)| *score).max(LEAST_SHARE);
         let shown = found.into_iter().filter(|(.., score)| *score > least).take(mirrors.count());
-        let mirror = |(plane, entities, score): (DVec4, Vec<usize>, f64)| {
-            let share = ((score / least - 1.0) / FADE).min(1.0);
-            Mirror { entities, share, ..Mirror::new(&seen, plane, mirrors.part) }
+        let mirror = |(place, entities, score): (Place, Vec<usize>, f64)| Mirror {
+            shape: match place {
+                Place::Plane(plane) => Shape::Plane(Plane::new(&seen, plane, mirrors.part)),
+                Place::Ball(centre, radius_m) => {
+                    let distance_m = centre.distance(seen.eye).max(radius_m);
+                    let texels = radius_m / distance_m * f64::from(mirrors.part[1]) / camera.half_height();
+                    Shape::Probe(Box::new(Probe::new(centre, radius_m, mirrors.face_side(texels))))
+                }
+            },
+            entities,
+            share: ((score / least - 1.0) / FADE).min(1.0),
         };
         shown.map(mirror).collect()
+    }
+
+    /// What an entity reflects of white light where it is seen at a cosine.
+    fn reflectance(&self, entity: usize, cosine: f64) -> f64 {
+        let entity = &self.scene.entities[entity];
+        let Some(gloss) = entity.gloss else { return 0.0 };
+        let f0 = brdf::facing(&gloss, entity.albedo.as_dvec3()).element_sum() / 3.0;
+        f0 + (1.0 - f0) * brdf::grazing(cosine)
     }
 
     /// What each mirror of the picture that was prepared last shows.
@@ -208,28 +290,36 @@ impl Frame {
             return Vec::new();
         };
         let shown = |(number, mirror): (usize, &Mirror)| {
-            let mut entities = self.drawn_entities(placements, &mirror.camera);
             // Highlights stand for the lamps that have them, and out of its cone a spot is dark.
             let of: HashSet<usize> = mirror.entities.iter().copied().collect();
-            let shown = reflections.glossy.iter().filter(|glossy| of.contains(&glossy.entity));
-            let highlights: HashSet<u32> = shown.flat_map(|glossy| glossy.lights).collect();
-            for entity in &mut entities {
-                entity.tag = if entity.transparent { entity.tag } else { 1.0 };
-                entity.gloss = None;
-                if highlights.contains(&entity.index) || self.scene.entities[entity.index as usize].spot.is_some() {
-                    entity.emission = Vec3::ZERO;
+            let glossy = reflections.glossy.iter().filter(|glossy| of.contains(&glossy.entity));
+            let highlights: HashSet<u32> = glossy.flat_map(|glossy| glossy.lights).collect();
+            let is_probe = matches!(mirror.shape, Shape::Probe(_));
+            let picture = |(face, camera): (usize, &SightCamera)| {
+                let mut entities = self.drawn_entities(placements, camera);
+                entities.retain(|entity| !(is_probe && of.contains(&(entity.index as usize))));
+                for entity in &mut entities {
+                    entity.tag = if entity.transparent { entity.tag } else { 1.0 };
+                    entity.gloss = None;
+                    if highlights.contains(&entity.index) || self.scene.entities[entity.index as usize].spot.is_some() {
+                        entity.emission = Vec3::ZERO;
+                    }
                 }
-            }
-            DrawnViewport {
-                area: mirrors.area(number),
-                entities,
-                radiosity: self.radiosity.mirrored(self.options.bounces),
-                gloss: None,
-                pixel: None,
-                lines: 0..0,
-            }
+                DrawnViewport {
+                    area: match &mirror.shape {
+                        Shape::Plane(_) => mirrors.area(number),
+                        Shape::Probe(probe) => mirrors.face_area(number, face, probe.side),
+                    },
+                    entities,
+                    radiosity: self.radiosity.mirrored(self.options.bounces),
+                    gloss: None,
+                    pixel: None,
+                    lines: 0..0,
+                }
+            };
+            mirror.cameras().iter().enumerate().map(picture).collect::<Vec<_>>()
         };
-        self.picture.mirrors.iter().enumerate().map(shown).collect()
+        self.picture.mirrors.iter().enumerate().flat_map(shown).collect()
     }
 
     /// Tells the glossy entities which mirrors they are.
@@ -242,21 +332,34 @@ impl Frame {
             let [left, _, part_width, part_height] = of_picture.area(number).map(f64::from);
             let across = part_width * of_picture.count() as f64;
             let focal_px = 0.5 * part_height / camera.half_height();
-            let plane = mirror.plane.truncate().extend(mirror.plane.dot(eye.extend(1.0)));
             for &entity in &mirror.entities {
-                entities[entity].mirror_plane = plane.as_vec4().to_array();
-                entities[entity].mirror_place =
-                    [part_width / across / width, 1.0 / height, left / across, mirror.share].map(|x| x as f32);
-                let behind = 1.0 / (mirror.depth_step * mirror.height_m);
-                entities[entity].mirror_view = [left, left + part_width, focal_px, behind].map(|x| x as f32);
+                let told = &mut entities[entity];
+                match &mirror.shape {
+                    Shape::Plane(of) => {
+                        let plane = of.plane.truncate().extend(of.plane.dot(eye.extend(1.0)));
+                        let behind = 1.0 / (of.depth_step * of.height_m);
+                        told.mirror_plane = plane.as_vec4().to_array();
+                        told.mirror_place =
+                            [part_width / across / width, 1.0 / height, left / across, mirror.share].map(|x| x as f32);
+                        told.mirror_view = [left, left + part_width, focal_px, behind].map(|x| x as f32);
+                    }
+                    Shape::Probe(probe) => {
+                        let side = f64::from(probe.side);
+                        told.probe = (probe.centre - eye).extend(side).as_vec4().to_array();
+                        told.mirror_place = [0.0, 0.0, 0.0, mirror.share as f32];
+                        told.mirror_view = [left, 0.0, 0.5 * side * ZOOM, probe.near_m].map(|x| x as f32);
+                    }
+                }
             }
         }
     }
 }
 
-/// How many planes of a scene may be mirrors at a time.
-pub(super) fn count(faces: &[Face]) -> u32 {
-    faces.len().min(MOST) as u32
+impl Reflectors {
+    /// How many mirrors there may be at a time.
+    pub fn count(&self) -> u32 {
+        (self.faces.len() + self.curved.len()).min(MOST) as u32
+    }
 }
 
 #[cfg(test)]
@@ -282,7 +385,7 @@ mod tests {
     #[test]
     fn the_mirrored_camera_sees_what_the_eye_sees_in_the_floor() {
         let seen = seen();
-        let mirror = Mirror::new(&seen, DVec4::Y, [64, 64]);
+        let mirror = Plane::new(&seen, DVec4::Y, [64, 64]);
         let through = |p: DVec3| mirror.camera.clip_from_world * p.extend(1.0);
         for point in [DVec3::new(0.2, 0.3, -0.5), DVec3::new(-0.4, 0.8, -3.0), DVec3::new(0.0, 2.0, -40.0)] {
             let clip = through(point);
@@ -302,14 +405,15 @@ mod tests {
 
     #[test]
     fn the_faces_of_a_box_are_flat_and_those_of_a_ball_are_not() {
-        let faces = flat_faces(&cuboid(Vec3::new(1.0, 2.0, 3.0), 4));
+        let (faces, share) = flat_faces(&cuboid(Vec3::new(1.0, 2.0, 3.0), 4));
         assert_eq!(faces.len(), 6);
+        assert!((share - 1.0).abs() < 1e-6, "{share}");
         for (corners, normal) in &faces {
             let area = (corners[1] - corners[0]).length() * (corners[2] - corners[1]).length();
             let wanted = 6.0 / DVec3::new(1.0, 2.0, 3.0).dot(normal.abs());
             assert!((area - wanted).abs() < 1e-5, "{normal}: {area}");
         }
-        assert!(flat_faces(&sphere(1.0, 3)).is_empty());
+        assert_eq!(flat_faces(&sphere(1.0, 3)), (Vec::new(), 0.0));
     }
 
     #[test]

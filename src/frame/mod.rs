@@ -18,6 +18,7 @@ mod picture;
 mod pixel;
 mod pose;
 mod prepare;
+mod probe;
 mod radiosity;
 mod record;
 mod sky;
@@ -94,8 +95,7 @@ pub struct Frame {
     /// What passes light on within rigid groups, where it bounces.
     bounce: Option<Bounce>,
     reflections: Option<Reflections>,
-    /// Faces that may be mirrors.
-    mirror_faces: Vec<mirror::Face>,
+    reflectors: mirror::Reflectors,
     picture: FramePicture,
 }
 
@@ -184,11 +184,16 @@ impl Frame {
         let soft = sharp.is_some();
         let sharp =
             sharp.map(|fitting| SharpPermutation { edges: pixels.is_some(), lamps: linked.is_some(), ..fitting });
-        let mirror_faces = if reflections.is_some() { mirror::faces(&scene) } else { Vec::new() };
-        if !mirror_faces.is_empty() && !bounces {
+        let reflectors = reflections.is_some().then(|| mirror::reflectors(&scene)).unwrap_or_default();
+        if reflectors.count() > 0 && !bounces {
             radiosity.keep_dark()?;
         }
-        let lights = PictureLights { pixels, highlights: sharp, mirrors: mirror::count(&mirror_faces) };
+        let lights = PictureLights {
+            pixels,
+            highlights: sharp,
+            mirrors: reflectors.count(),
+            probes: !reflectors.curved.is_empty(),
+        };
         let picture = FramePicture::new(device, library, &options, lights)?;
         // Shaders take long to compile, so that this is done on all cores.
         let merging = || Merge::new(device, library, permutation);
@@ -219,7 +224,7 @@ impl Frame {
             radiosity,
             picture,
             reflections,
-            mirror_faces,
+            reflectors,
             chains: None,
             bounce,
             buffers,

@@ -32,7 +32,7 @@ pub(super) struct FramePicture {
     pub lines: Lines,
     /// Its viewports, and which of the lines belong to each.
     pub prepared: Vec<(Viewport, Range<u32>)>,
-    /// The planes that mirror in it.
+    /// What mirrors in it.
     pub mirrors: Vec<mirror::Mirror>,
     /// Edges of each mesh, once a picture wants its outlines.
     pub edges: Vec<Edges>,
@@ -119,7 +119,12 @@ impl Frame {
     fn draw(&self, options: &Options) -> Result<Draw> {
         let sharp = self.sharp.as_ref().map(|sharp| sharp.permutation);
         let pixels = pixel_shading(&self.device, options, &self.buffers, self.radiosity.soft(), sharp);
-        let lights = PictureLights { pixels, highlights: sharp, mirrors: mirror::count(&self.mirror_faces) };
+        let lights = PictureLights {
+            pixels,
+            highlights: sharp,
+            mirrors: self.reflectors.count(),
+            probes: !self.reflectors.curved.is_empty(),
+        };
         Draw::new(&self.device, &self.library, options.size, options.antialias, lights)
     }
 

@@ -99,7 +99,7 @@ impl Frame {
         let state = self.state(placements);
         let mut cameras = self.lit_cameras(viewports);
         if !cameras.is_empty() {
-            cameras.extend(self.picture.mirrors.iter().map(|mirror| mirror.camera));
+            cameras.extend(self.picture.mirrors.iter().flat_map(|mirror| mirror.cameras()).copied());
         }
         let sights = self.sights(placements, &cameras);
         let work = &mut self.work;

@@ -63,6 +63,7 @@ fn glossy_entities() {
             mirror_plane,
             mirror_place,
             mirror_view,
+            probe,
         }
     );
     assert_eq!(reflection.strides.get("GlossEntity"), Some(&(size_of::<GlossEntity>() as u32)));

@@ -1,0 +1,97 @@
+//! Probes: what stands around a curved glossy surface, in six pictures from its middle.
+
+use crate::asset::mesh::Mesh;
+use crate::draw::mirror::ZOOM;
+use crate::lists::sight::SightCamera;
+use glam::{DMat4, DVec3, DVec4};
+
+/// Distance from the middle, in bounding radii, within which nothing is shown.
+const NEAREST: f64 = 0.2;
+/// Least mean over a surface of its outwardness, the cosine between its normal and the way from the middle times the
+/// share of the radius that this way is: 1 of a ball, 0 of a plane, less of a room.
+const LEAST_OUTWARD: f64 = 0.15;
+
+/// Six pictures from a place: along x, -x, y and so on.
+pub(super) struct Probe {
+    pub centre: DVec3,
+    pub near_m: f64,
+    /// Width and height of each picture in texels.
+    pub side: u32,
+    pub cameras: [SightCamera; 6],
+}
+
+impl Probe {
+    /// Of an entity with a bounding ball; each picture has `side` x `side` texels.
+    pub fn new(centre: DVec3, radius_m: f64, side: u32) -> Self {
+        let near_m = NEAREST * radius_m;
+        let camera = |face: usize| SightCamera {
+            clip_from_world: clip_from_world(centre, near_m, face),
+            eye: centre,
+            near_m: near_m * (1.0 + 2.0 / (ZOOM * ZOOM)).sqrt(),
+            size: [side; 2],
+            samples: false,
+        };
+        Probe { centre, near_m, side, cameras: std::array::from_fn(camera) }
+    }
+}
+
+/// Across, down and forward of a picture are the world's axes in turn.
+fn clip_from_world(centre: DVec3, near_m: f64, face: usize) -> DMat4 {
+    let axis = |offset: usize| DVec3::AXES[(face / 2 + offset) % 3];
+    let forward = if face % 2 == 0 { axis(0) } else { -axis(0) };
+    let row = |of: DVec3| of.extend(-of.dot(centre));
+    DMat4::from_cols(row(ZOOM * axis(1)), row(ZOOM * axis(2)), DVec4::W * near_m, row(forward)).transpose()
+}
+
+/// Whether a surface mostly faces away from its middle, so that it hides little of what it reflects.
+pub(super) fn is_outward(mesh: &Mesh) -> bool {
+    let (centre, radius_m) = mesh.bounding_sphere();
+    let mut sum = 0.0;
+    let mut area_m2 = 0.0;
+    for triangle in &mesh.triangles {
+        let [a, b, c] = triangle.map(|v| (mesh.positions[v as usize] - centre).as_dvec3());
+        let twice = (b - a).cross(c - a);
+        sum += twice.dot(a + b + c) / 6.0;
+        area_m2 += 0.5 * twice.length();
+    }
+    sum > LEAST_OUTWARD * area_m2 * f64::from(radius_m)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::asset::generate;
+
+    /// As `probe_place` in `glsl/mirror.glsl` has it.
+    fn place(toward: DVec3) -> (usize, [f64; 2]) {
+        let size = toward.abs();
+        let axis = if size.x >= size.y.max(size.z) {
+            0
+        } else if size.y >= size.z {
+            1
+        } else {
+            2
+        };
+        let face = 2 * axis + usize::from(toward[axis] < 0.0);
+        (face, [1, 2].map(|offset| ZOOM * toward[(axis + offset) % 3] / size[axis]))
+    }
+
+    #[test]
+    fn every_direction_is_in_the_picture_where_the_shader_looks() {
+        let centre = DVec3::new(1.0, -2.0, 0.5);
+        let probe = Probe::new(centre, 0.5, 64);
+        for point in [DVec3::new(3.0, 0.2, 0.1), DVec3::new(1.2, -5.0, 1.0), DVec3::new(0.8, -1.5, -7.0)] {
+            let (face, [x, y]) = place(point - centre);
+            let clip = probe.cameras[face].clip_from_world * point.extend(1.0);
+            assert!(clip.w > 0.0 && clip.z < clip.w, "{point}");
+            assert!((clip.x / clip.w - x).abs() < 1e-12 && (clip.y / clip.w - y).abs() < 1e-12, "{point}");
+            assert!((probe.near_m * clip.w / clip.z - clip.w).abs() < 1e-12, "depth tells how far it is");
+        }
+    }
+
+    #[test]
+    fn balls_and_rings_face_outwards_and_planes_do_not() {
+        assert!(is_outward(&generate::sphere(1.0, 3)) && is_outward(&generate::torus(0.7, 0.25, 24, 12)));
+        assert!(!is_outward(&generate::plane(2.0, 4)));
+    }
+}

@@ -100,18 +100,25 @@ vec3 glossy(uint index, vec3 base, vec3 light, vec4 share, vec2 uv, float within
 #if MIRRORED
     float of_mirror = mirror_share(entity, n, from_eye);
 #if PROBES
-    vec3 ray = reflect(-view.toward, view.normal);
+    vec3 ray = reflect(-view.toward, view.normal), place = from_eye - entity.probe.xyz;
     float turn = max(length(dFdx(ray)), length(dFdy(ray)));
     bool is_probe = entity.probe.w > 0.0;
-    of_mirror = is_probe ? entity.mirror_place.w : of_mirror;
+    // What faces inwards sees its own surface, as its vertices do.
+    float outward = smoothstep(-0.1, 0.1, dot(n, place) / max(length(place), 1e-6));
+    of_mirror = is_probe ? outward * entity.mirror_place.w : of_mirror;
+#else
+    const bool is_probe = false;
 #endif
     if (of_mirror > 0.0) {
-        vec3 tilt = view.normal - n;
-        vec4 mirrored = mirrored_light(entity, sqrt(view.alpha * view.alpha + dot(tilt, tilt)));
+        vec4 mirrored;
+        if (is_probe) {
 #if PROBES
-        vec4 probed = probed_light(entity, view.alpha, from_eye, ray, turn);
-        mirrored = is_probe ? probed : mirrored;
+            mirrored = probed_light(entity, view.alpha, place, ray, turn);
 #endif
+        } else {
+            vec3 tilt = view.normal - n;
+            mirrored = mirrored_light(entity, sqrt(view.alpha * view.alpha + dot(tilt, tilt)));
+        }
         through = mix(through, vec3((1.0 - mirrored.a) * entity.sky_scale), of_mirror);
         nearby = mix(nearby, mirrored.rgb, of_mirror);
     }

@@ -111,7 +111,7 @@ vec2 reflect_light(View view, vec3 to, Entity shining) {
     // Slopes have no bound at the horizon: there the light is a point.
     float omega = part_light(light, Block(vec2(0.0), 0.0, 1.0, 1.0), vec2(0.0), along_axes(light, vec2(0.0)));
     float low = lobe_of_part(view, light.toward, cosine, omega) * cosine * omega;
-    value = mix(low, value, clamp((outline.lowest - LOW_FROM) / (LOW_TO - LOW_FROM), 0.0, 1.0));
+    value = mix(low, value, clamp((outline.lowest / view.alpha - LOW_FROM) / (LOW_TO - LOW_FROM), 0.0, 1.0));
     value *= clamp(0.5 + 0.5 * centre / light.sine, 0.0, 1.0);
     bool seen = lit > 0.0;
 #if PANELS

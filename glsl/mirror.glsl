@@ -33,8 +33,6 @@ vec4 mirrored_light(GlossEntity entity, float alpha) {
 }
 
 #if PROBES
-// The coarsest level that keeps the pictures of a probe apart.
-const float PROBE_LEVEL = 4.0;
 const uint PROBE_STEPS = 5;
 const uint PROBE_HALVINGS = 5;
 
@@ -42,42 +40,40 @@ const uint PROBE_HALVINGS = 5;
 vec2 probe_place(GlossEntity entity, vec3 toward, float level) {
     vec3 size = abs(toward);
     uint axis = size.x >= max(size.y, size.z) ? 0 : size.y >= size.z ? 1 : 2;
-    vec2 tilt = vec2(toward[(axis + 1) % 3], toward[(axis + 2) % 3]) / size[axis];
+    vec2 tilt = vec2(toward[(axis + 1) % 3], toward[(axis + 2) % 3]) / max(size[axis], 1e-20);
     float side = entity.probe.w, rim = 0.5 * exp2(ceil(level));
     uint face = 2 * axis + (toward[axis] < 0.0 ? 1 : 0);
     vec2 corner = vec2(entity.mirror_view.x, 0.0) + side * vec2(face % 3, face / 3);
     return corner + clamp(side * (0.5 + 0.5 * PROBE_ZOOM * tilt), rim, side - rim);
 }
 
-// Whether a place, from a probe, lies behind what the probe sees that way; `far` is how far it sees there.
-bool is_behind(GlossEntity entity, vec3 place, float level, out float far) {
-    float reach = length(place);
-    vec3 toward = place / max(reach, 1e-20), sides = abs(toward);
-    float depth = textureLod(mirror_far, probe_place(entity, toward, level) / vec2(textureSize(mirror_far, 0)), level).x;
-    far = entity.mirror_view.w / max((1.0 - depth) * max(sides.x, max(sides.y, sides.z)), 1e-6);
-    return reach > far;
+// Whether a place, from a probe, lies behind what the probe sees that way.
+bool is_behind(GlossEntity entity, vec3 place, float level) {
+    vec3 sides = abs(place);
+    vec2 texel = probe_place(entity, place, level) / vec2(textureSize(mirror_far, 0));
+    float near = 1.0 - textureLod(mirror_far, texel, level).x;
+    return max(sides.x, max(sides.y, sides.z)) * near > entity.mirror_view.w;
 }
 
-// Radiance of what a curved surface mirrors along a unit vector, and the share of the lobe that it fills; `turn` is how
-// far that vector turns from one pixel to the next. The ray is followed in steps to where it is first behind what the
-// probe sees, a share of the way to infinity, and that is halved.
-vec4 probed_light(GlossEntity entity, float alpha, vec3 from_eye, vec3 toward, float turn) {
-    vec3 place = from_eye - entity.probe.xyz;
-    float scale = length(place), far;
-    float widest = MIRROR_SPREAD * alpha * entity.mirror_view.z, of_pixel = 0.5 * turn * entity.mirror_view.z;
-    float level = min(blur_level(0.5 * widest + of_pixel), PROBE_LEVEL);
+// Radiance of what a curved surface mirrors along a unit vector from a place, from its probe, and the share of the lobe
+// that it fills; `turn` is how far that vector turns from one pixel to the next. The ray is followed in steps to where it
+// is first behind what the probe sees, a share of the way to infinity, and the last step is halved.
+vec4 probed_light(GlossEntity entity, float alpha, vec3 place, vec3 toward, float turn) {
+    float scale = max(length(place), 1e-6);
+    float widest = PROBE_SPREAD * alpha * entity.mirror_view.z, of_pixel = 0.5 * turn * entity.mirror_view.z;
+    float level = min(blur_level(0.5 * widest + of_pixel), float(PROBE_LEVEL));
     float before = 0.0, behind = 1.0;
     for (uint i = 0; i < PROBE_STEPS + PROBE_HALVINGS; i++) {
         float next = i < PROBE_STEPS ? float(i + 1) / float(PROBE_STEPS + 1) : 0.5 * (before + behind);
         bool open = i >= PROBE_STEPS || behind == 1.0;
-        bool hit = is_behind(entity, place + scale * next / (1.0 - next) * toward, level, far);
+        bool hit = is_behind(entity, place + scale * next / (1.0 - next) * toward, level);
         behind = open && hit ? next : behind;
         before = open && !hit ? next : before;
     }
     float share = 0.5 * (before + behind), way = scale * share / (1.0 - share);
-    is_behind(entity, place + way * toward, level, far);
-    level = min(blur_level(widest * min(way / far, 1.0) + of_pixel), PROBE_LEVEL);
+    vec3 met = place + way * toward;
+    level = min(blur_level(widest * min(way / max(length(met), 1e-6), 1.0) + of_pixel), float(PROBE_LEVEL));
     vec2 size = vec2(textureSize(mirror_levels, 0));
-    return textureLod(mirror_levels, probe_place(entity, normalize(place + way * toward), level) / size, level);
+    return textureLod(mirror_levels, probe_place(entity, met, level) / size, level);
 }
 #endif

@@ -177,7 +177,7 @@ shared_struct! {
         /// The plane that mirrors, by the world's axes from the eye: unit normal and offset.
         mirror_plane: [f32; 4],
         /// From pixels to places on the picture of mirrors: factors on both, and what is added to the first. The share
-        /// of the mirror's picture in what the plane reflects.
+        /// of the mirror's picture in what its surface reflects.
         mirror_place: [f32; 4],
         /// Left edge of the mirror's part of that picture, and one behind its right one, texels. Radius in texels of a
         /// lobe of slope 1. Factor on what depth leaves of 1, over that of a pixel's view depth, that gives the share of

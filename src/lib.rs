@@ -52,8 +52,9 @@
 //!   passes its base colour's share of light on as a diffuse surface does, metals too.
 //! - Gloss: roughness, metal and a base colour as in glTF ([`gloss`]). The merge leaves the transfer past everything, of
 //!   which the share of a reflected sky follows for any view. The rest of a lobe is filled with bounced light: along a
-//!   vertex's links by where they lead, and alike with that of what moves. Flat faces of a low roughness show a picture
-//!   that is drawn for them ([`draw::mirror`]). A highlight is the share of the microfacets that mirror its light.
+//!   vertex's links by where they lead, and alike with that of what moves. Flat faces of a low roughness, and what
+//!   is curved, show pictures that are drawn for them ([`draw::mirror`]). A highlight is the share of the microfacets
+//!   that mirror its light.
 //! - Light: it is linear Rec.709 radiance. The radiosity is B = albedo/pi * integral of L V max(0, n.w) dw.
 //! - Numbers: tables are made in f64, shaders compute in f32, and fields are stored as f16 or f32.
 //!

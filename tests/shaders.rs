@@ -122,9 +122,13 @@ fn drawing() -> Vec<ShaderPermutation> {
     let ways = [None, Some(&sharp[0]), Some(&sharp[1])];
     let grids = [false, true].map(DrawGrid::rows).concat();
     let glossy = ways.into_iter().flat_map(|highlights| {
-        let mirrored = if highlights.is_some() { Mirrored::PlanesAndBalls } else { Mirrored::Planes };
-        let details = [Detail::Rough, Detail::Mirror, Detail::Textured];
-        details.map(|detail| Look::Glossy { highlights, detail, mirrored })
+        let rows = [
+            (Detail::Rough, Mirrored::Nothing),
+            (Detail::Mirror, Mirrored::Planes),
+            (Detail::Mirror, Mirrored::PlanesAndProbes),
+            (Detail::Textured, Mirrored::PlanesAndProbes),
+        ];
+        rows.map(|(detail, mirrored)| Look::Glossy { highlights, detail, mirrored })
     });
     let looks: Vec<Look<'_>> = [Look::Plain, Look::Painted].into_iter().chain(glossy).collect();
     let triangles = looks.iter().flat_map(|&look| {

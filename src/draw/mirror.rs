@@ -6,8 +6,8 @@
 //! blur. Where the picture is empty the sky is mirrored.
 //!
 //! A curved surface has a probe: six pictures from its middle of what stands around it, without it, in its part of that
-//! picture. A pixel follows the mirrored ray from its own place: the ball about the middle through what it would meet
-//! tells where it does, three times over. In a probe a surface does not see itself.
+//! picture. A pixel follows the mirrored ray from its own place, in steps, to where it is behind what these show. A pane
+//! counts as what it hides there, and a surface does not see itself.
 
 use crate::draw::triangles::DrawnSurface;
 use crate::draw::{Antialias, Draw, DrawnViewport, PictureLights};
@@ -25,6 +25,8 @@ const LEVELS: u32 = 6;
 const COARSEST: u32 = 1 << (LEVELS - 1);
 /// Radius of the blur over that of the microfacets' slopes, at a distance of 1 from the mirror.
 pub const SPREAD: f64 = 1.6;
+/// The same for probes, as an angle: most of what they show is faced, and a mirrored ray turns by twice a slope.
+pub const PROBE_SPREAD: f64 = 3.2;
 /// Least cosine of the angle between a pixel's normal and the plane's. What this leaves of 1 is how far off the plane a
 /// pixel may lie, over its distance from the eye.
 pub const FLAT: f64 = 0.999;
@@ -35,8 +37,9 @@ const MOST_RADIANCE: f32 = 65_504.0;
 /// Half of the width of a probe's picture over the tangent of the angle that it shows to each side: less than 1, so that
 /// blur at the edge of a picture finds what the next one shows.
 pub const ZOOM: f64 = 0.8;
-/// Texels of the finest level along a texel of the coarsest that probes read.
-const PROBE_COARSEST: u32 = 16;
+/// The coarsest level that probes read, and texels of the finest along one of its texels.
+pub const PROBE_LEVEL: u32 = 4;
+const PROBE_COARSEST: u32 = 1 << PROBE_LEVEL;
 /// Least width of its pictures, where there is room.
 const LEAST_SIDE: u32 = 64;
 
@@ -46,7 +49,12 @@ pub enum Mirrored {
     Nothing,
     Planes,
     /// Curved surfaces, too.
-    PlanesAndBalls,
+    PlanesAndProbes,
+}
+
+/// Width and height of a probe's pictures from which on a lobe is wider than the coarsest level's texels.
+pub fn finest_side(roughness: f64) -> f64 {
+    f64::from(2 * PROBE_COARSEST) / (ZOOM * PROBE_SPREAD * (roughness * roughness).max(1e-3))
 }
 
 /// What mirrors show, in one picture.
@@ -62,7 +70,7 @@ pub struct Mirrors {
 }
 
 impl Mirrors {
-    /// For pictures of `size`, width and height in pixels, in which at most `count` planes are mirrors.
+    /// For pictures of `size`, width and height in pixels, with at most `count` mirrors.
     pub fn new(device: &Arc<Device>, library: &Library, size: [u32; 2], count: u32) -> Result<Self> {
         // Texels of the coarsest level belong to one mirror each.
         let texel_px = if device.info.is_software() { 2 } else { 1 };
@@ -71,7 +79,7 @@ impl Mirrors {
             pixels.div_ceil(texel_px).next_multiple_of(COARSEST).min(most / COARSEST * COARSEST)
         };
         let part = [fit(size[0], most / count), fit(size[1], most)];
-        let lights = PictureLights { pixels: None, highlights: None, mirrors: 0, probes: false };
+        let lights = PictureLights { pixels: None, highlights: None, mirrors: 0, mirrored: Mirrored::Nothing };
         let draw = Draw::new(device, library, [count * part[0], part[1]], Antialias::None, lights)?;
         let shape = draw.picture.shape;
         let of_far = ImageShape { format: vk::Format::R16_SFLOAT, ..shape };
@@ -90,7 +98,7 @@ impl Mirrors {
         })
     }
 
-    /// How many planes may be mirrors.
+    /// How many mirrors there may be.
     pub fn count(&self) -> usize {
         (self.draw.picture.shape.width / self.part[0]) as usize
     }

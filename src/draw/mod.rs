@@ -226,18 +226,7 @@ pub struct PictureLights {
     pub highlights: Option<SharpPermutation>,
     /// How many mirrors there may be at a time.
     pub mirrors: u32,
-    /// Whether some of them may be curved.
-    pub probes: bool,
-}
-
-impl PictureLights {
-    fn mirrored(&self) -> Mirrored {
-        match (self.mirrors, self.probes) {
-            (0, _) => Mirrored::Nothing,
-            (_, false) => Mirrored::Planes,
-            (_, true) => Mirrored::PlanesAndBalls,
-        }
-    }
+    pub mirrored: Mirrored,
 }
 
 /// What pipelines are made of that draw into the same images.

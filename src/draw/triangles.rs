@@ -157,8 +157,10 @@ impl Look<'_> {
             .define("HIGHLIGHTS", highlights.is_some())
             .define("MIRROR", detail != Detail::Rough)
             .define("MIRRORED", mirrored != Mirrored::Nothing && detail != Detail::Rough)
-            .define("PROBES", mirrored == Mirrored::PlanesAndBalls)
+            .define("PROBES", mirrored == Mirrored::PlanesAndProbes)
+            .define("PROBE_LEVEL", mirror::PROBE_LEVEL)
             .number("PROBE_ZOOM", mirror::ZOOM)
+            .number("PROBE_SPREAD", mirror::PROBE_SPREAD)
             .define("MIRROR_BINDING", MIRROR_BINDING)
             .number("MIRROR_SPREAD", mirror::SPREAD)
             .number("MIRROR_FLAT", mirror::FLAT)
@@ -209,7 +211,7 @@ pub struct DrawTriangles {
 
 impl DrawTriangles {
     pub fn new(maker: PipelineMaker, lights: PictureLights) -> Self {
-        DrawTriangles { maker, highlights: lights.highlights, mirrored: lights.mirrored(), made: Default::default() }
+        DrawTriangles { maker, highlights: lights.highlights, mirrored: lights.mirrored, made: Default::default() }
     }
 
     /// Makes what surfaces are drawn with, on all cores; `by_pixel` where pixels have light of their own.

@@ -6,17 +6,18 @@ use super::viewport::Viewport;
 use super::{Frame, gloss};
 use crate::asset::edges::within_picture;
 use crate::asset::mesh::Mesh;
-use crate::draw::DrawnViewport;
-use crate::draw::mirror::ZOOM;
+use crate::draw::mirror::{Mirrored, ZOOM, finest_side};
 use crate::draw::triangles::Detail;
+use crate::draw::{DrawnEntity, DrawnViewport, PictureLights};
 use crate::gloss::{PIXEL_ROUGHNESS, brdf};
 use crate::layout::GlossEntity;
 use crate::lists::sight::SightCamera;
 use crate::scene::{Placement, Scene};
+use crate::sharp::SharpPermutation;
 use glam::{DMat4, DVec2, DVec3, DVec4, Vec3};
 use std::collections::{HashMap, HashSet};
 
-/// The most planes that are mirrors at a time.
+/// The most mirrors at a time.
 const MOST: usize = 4;
 /// Least share of a picture's light that a mirror reflects: of the pixels, times the reflectance.
 const LEAST_SHARE: f64 = 5e-4;
@@ -46,8 +47,8 @@ pub(super) struct Face {
 #[derive(Default)]
 pub(super) struct Reflectors {
     faces: Vec<Face>,
-    /// Entities that are curved.
-    pub curved: Vec<usize>,
+    /// Entities that are curved, and their middles in the mesh's frame.
+    curved: Vec<(usize, DVec3)>,
 }
 
 /// A mirror of the next picture.
@@ -89,20 +90,21 @@ pub(super) fn reflectors(scene: &Scene) -> Reflectors {
         let mirrors = matches!(gloss::detail(entity), Some(Detail::Mirror | Detail::Textured));
         mirrors && !entity.transparent && entity.gloss.is_some_and(|gloss| gloss.roughness < PIXEL_ROUGHNESS)
     });
-    let mut of_mesh: HashMap<usize, Vec<([DVec3; 4], DVec3)>> = HashMap::new();
-    let mut is_curved: HashMap<usize, bool> = HashMap::new();
+    let mut of_mesh = HashMap::new();
     let mut out = Reflectors::default();
     for (entity, of) in glossy {
         let mesh = &scene.meshes[of.mesh];
-        let flat = of_mesh.entry(of.mesh).or_insert_with(|| {
-            let (faces, share) = flat_faces(mesh);
-            is_curved.insert(of.mesh, share < FLAT_MESH && probe::is_outward(mesh));
-            faces
+        let (flat, centre) = of_mesh.entry(of.mesh).or_insert_with(|| {
+            let (flat, share) = flat_faces(mesh);
+            (flat, (share < FLAT_MESH).then(|| probe::outward_centre(mesh)).flatten())
         });
-        if is_curved[&of.mesh] {
-            out.curved.push(entity);
-        } else {
-            out.faces.extend(flat.iter().map(|(corners, normal)| Face { entity, corners: *corners, normal: *normal }));
+        match centre {
+            Some(centre) => out.curved.push((entity, *centre)),
+            None => out.faces.extend(flat.iter().map(|(corners, normal)| Face {
+                entity,
+                corners: *corners,
+                normal: *normal,
+            })),
         }
     }
     out
@@ -240,17 +242,17 @@ impl Frame {
                 None => found.push((Place::Plane(plane), vec![face.entity], score)),
             }
         }
-        let curved = self.reflectors.curved.iter().filter(|_| mirrors.face_side(f64::INFINITY) > 0);
-        for &entity in curved {
-            let centre = self.centre(entity, &placements[entity]);
-            let mesh = &self.buffers.meshes[self.scene.entities[entity].mesh];
-            let radius_m = mesh.radius_m * f64::from(placements[entity].scale);
+        let has_room = mirrors.face_side(f64::INFINITY) > 0;
+        for (entity, centre) in self.reflectors.curved.iter().filter(|_| has_room) {
+            let placement = &placements[*entity];
+            let centre = placement.point(*centre);
+            let radius_m = self.radius_m(*entity, placement);
             let Some(toward) = (seen.eye - centre).try_normalize() else { continue };
             let (x, y) = toward.any_orthonormal_pair();
             let [x, y] = [x, y].map(|axis| SEEN_RADIUS * radius_m * axis);
             let corners = [centre - x - y, centre + x - y, centre + x + y, centre - x + y];
-            let score = self.reflectance(entity, 0.5) * share_of_picture(seen.clip_from_world, corners);
-            found.push((Place::Ball(centre, radius_m), vec![entity], score));
+            let score = self.reflectance(*entity, 0.5) * share_of_picture(seen.clip_from_world, corners);
+            found.push((Place::Ball(centre, radius_m), vec![*entity], score));
         }
         found.retain(|(.., score)| *score > 0.0);
         found.sort_by(|(_, _, a), (_, _, b)| b.total_cmp(a));
@@ -265,15 +267,29 @@ impl Frame {
             shape: match place {
                 Place::Plane(plane) => Shape::Plane(Plane::new(&seen, plane, mirrors.part)),
                 Place::Ball(centre, radius_m) => {
+                    // As wide as it is seen, and no finer than its blur.
                     let distance_m = centre.distance(seen.eye).max(radius_m);
                     let texels = radius_m / distance_m * f64::from(mirrors.part[1]) / camera.half_height();
-                    Shape::Probe(Box::new(Probe::new(centre, radius_m, mirrors.face_side(texels))))
+                    let roughness = self.scene.entities[entities[0]].gloss.map_or(0.0, |gloss| gloss.roughness);
+                    let side = mirrors.face_side(texels.min(finest_side(f64::from(roughness))));
+                    Shape::Probe(Box::new(Probe::new(centre, radius_m, side)))
                 }
             },
             entities,
             share: ((score / least - 1.0) / FADE).min(1.0),
         };
         shown.map(mirror).collect()
+    }
+
+    /// Of the ball around an entity, metres.
+    fn radius_m(&self, entity: usize, placement: &Placement) -> f64 {
+        self.buffers.meshes[self.scene.entities[entity].mesh].radius_m * f64::from(placement.scale)
+    }
+
+    /// Whether an entity is to be seen in a probe: neither what has it nor what is within that.
+    fn is_around(&self, probe: &Probe, of: &HashSet<usize>, entity: usize, placement: &Placement) -> bool {
+        let inside = self.centre(entity, placement).distance(probe.centre) + self.radius_m(entity, placement);
+        !of.contains(&entity) && inside > probe.radius_m
     }
 
     /// What an entity reflects of white light where it is seen at a cosine.
@@ -294,10 +310,12 @@ impl Frame {
             let of: HashSet<usize> = mirror.entities.iter().copied().collect();
             let glossy = reflections.glossy.iter().filter(|glossy| of.contains(&glossy.entity));
             let highlights: HashSet<u32> = glossy.flat_map(|glossy| glossy.lights).collect();
-            let is_probe = matches!(mirror.shape, Shape::Probe(_));
             let picture = |(face, camera): (usize, &SightCamera)| {
                 let mut entities = self.drawn_entities(placements, camera);
-                entities.retain(|entity| !(is_probe && of.contains(&(entity.index as usize))));
+                if let Shape::Probe(probe) = &mirror.shape {
+                    let index = |entity: &DrawnEntity<'_>| entity.index as usize;
+                    entities.retain(|entity| self.is_around(probe, &of, index(entity), &placements[index(entity)]));
+                }
                 for entity in &mut entities {
                     entity.tag = if entity.transparent { entity.tag } else { 1.0 };
                     entity.gloss = None;
@@ -356,9 +374,15 @@ impl Frame {
 }
 
 impl Reflectors {
-    /// How many mirrors there may be at a time.
-    pub fn count(&self) -> u32 {
-        (self.faces.len() + self.curved.len()).min(MOST) as u32
+    /// How pictures evaluate lights, and what they mirror.
+    pub fn lights(&self, pixels: Option<SharpPermutation>, highlights: Option<SharpPermutation>) -> PictureLights {
+        let count = (self.faces.len() + self.curved.len()).min(MOST) as u32;
+        let mirrored = match (count, self.curved.is_empty()) {
+            (0, _) => Mirrored::Nothing,
+            (_, true) => Mirrored::Planes,
+            (_, false) => Mirrored::PlanesAndProbes,
+        };
+        PictureLights { pixels, highlights, mirrors: count, mirrored }
     }
 }
 

@@ -30,7 +30,7 @@ use crate::bake::ensure::SceneProgress;
 use crate::bake::surfaces::SurfacePlan;
 use crate::bake::{self, Baker, SceneNeeds};
 use crate::bounce::{Bounce, BounceWork, Bounces, Linked, LinkedEntity};
-use crate::draw::{PictureLights, Shading};
+use crate::draw::Shading;
 use crate::error::Result;
 use crate::gloss::Reflections;
 use crate::gpu::{self, Buffer, Commands, Device, Timing};
@@ -185,15 +185,10 @@ impl Frame {
         let sharp =
             sharp.map(|fitting| SharpPermutation { edges: pixels.is_some(), lamps: linked.is_some(), ..fitting });
         let reflectors = reflections.is_some().then(|| mirror::reflectors(&scene)).unwrap_or_default();
-        if reflectors.count() > 0 && !bounces {
+        let lights = reflectors.lights(pixels, sharp);
+        if lights.mirrors > 0 && !bounces {
             radiosity.keep_dark()?;
         }
-        let lights = PictureLights {
-            pixels,
-            highlights: sharp,
-            mirrors: reflectors.count(),
-            probes: !reflectors.curved.is_empty(),
-        };
         let picture = FramePicture::new(device, library, &options, lights)?;
         // Shaders take long to compile, so that this is done on all cores.
         let merging = || Merge::new(device, library, permutation);

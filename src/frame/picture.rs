@@ -119,12 +119,7 @@ impl Frame {
     fn draw(&self, options: &Options) -> Result<Draw> {
         let sharp = self.sharp.as_ref().map(|sharp| sharp.permutation);
         let pixels = pixel_shading(&self.device, options, &self.buffers, self.radiosity.soft(), sharp);
-        let lights = PictureLights {
-            pixels,
-            highlights: sharp,
-            mirrors: self.reflectors.count(),
-            probes: !self.reflectors.curved.is_empty(),
-        };
+        let lights = self.reflectors.lights(pixels, sharp);
         Draw::new(&self.device, &self.library, options.size, options.antialias, lights)
     }
 

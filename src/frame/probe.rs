@@ -6,7 +6,7 @@ use crate::lists::sight::SightCamera;
 use glam::{DMat4, DVec3, DVec4};
 
 /// Distance from the middle, in bounding radii, within which nothing is shown.
-const NEAREST: f64 = 0.2;
+const NEAREST: f64 = 0.05;
 /// Least mean over a surface of its outwardness, the cosine between its normal and the way from the middle times the
 /// share of the radius that this way is: 1 of a ball, 0 of a plane, less of a room.
 const LEAST_OUTWARD: f64 = 0.15;
@@ -14,6 +14,8 @@ const LEAST_OUTWARD: f64 = 0.15;
 /// Six pictures from a place: along x, -x, y and so on.
 pub(super) struct Probe {
     pub centre: DVec3,
+    /// Of the ball around what has it, metres.
+    pub radius_m: f64,
     pub near_m: f64,
     /// Width and height of each picture in texels.
     pub side: u32,
@@ -31,7 +33,7 @@ impl Probe {
             size: [side; 2],
             samples: false,
         };
-        Probe { centre, near_m, side, cameras: std::array::from_fn(camera) }
+        Probe { centre, radius_m, near_m, side, cameras: std::array::from_fn(camera) }
     }
 }
 
@@ -43,18 +45,24 @@ fn clip_from_world(centre: DVec3, near_m: f64, face: usize) -> DMat4 {
     DMat4::from_cols(row(ZOOM * axis(1)), row(ZOOM * axis(2)), DVec4::W * near_m, row(forward)).transpose()
 }
 
-/// Whether a surface mostly faces away from its middle, so that it hides little of what it reflects.
-pub(super) fn is_outward(mesh: &Mesh) -> bool {
+/// The middle of a surface that mostly faces away from it, so that it hides little of what it reflects.
+pub(super) fn outward_centre(mesh: &Mesh) -> Option<DVec3> {
     let (centre, radius_m) = mesh.bounding_sphere();
-    let mut sum = 0.0;
+    let mut mean = DVec3::ZERO;
+    let mut facing = DVec3::ZERO;
+    let mut outward = 0.0;
     let mut area_m2 = 0.0;
     for triangle in &mesh.triangles {
         let [a, b, c] = triangle.map(|v| (mesh.positions[v as usize] - centre).as_dvec3());
-        let twice = (b - a).cross(c - a);
-        sum += twice.dot(a + b + c) / 6.0;
-        area_m2 += 0.5 * twice.length();
+        let normal_m2 = 0.5 * (b - a).cross(c - a);
+        let middle = (a + b + c) / 3.0;
+        mean += normal_m2.length() * middle;
+        facing += normal_m2;
+        outward += normal_m2.dot(middle);
+        area_m2 += normal_m2.length();
     }
-    sum > LEAST_OUTWARD * area_m2 * f64::from(radius_m)
+    mean /= area_m2;
+    (outward - facing.dot(mean) > LEAST_OUTWARD * area_m2 * f64::from(radius_m)).then(|| centre.as_dvec3() + mean)
 }
 
 #[cfg(test)]
@@ -91,7 +99,9 @@ mod tests {
 
     #[test]
     fn balls_and_rings_face_outwards_and_planes_do_not() {
-        assert!(is_outward(&generate::sphere(1.0, 3)) && is_outward(&generate::torus(0.7, 0.25, 24, 12)));
-        assert!(!is_outward(&generate::plane(2.0, 4)));
+        for mesh in [generate::sphere(1.0, 3), generate::torus(0.7, 0.25, 24, 12)] {
+            assert!(outward_centre(&mesh).unwrap().length() < 1e-3, "{}", mesh.name);
+        }
+        assert_eq!(outward_centre(&generate::plane(2.0, 4)), None);
     }
 }

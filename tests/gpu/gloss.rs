@@ -207,25 +207,26 @@ fn curved_surfaces_mirror_what_stands_around_them() {
     let Some(gpu) = gpu() else { return };
     let scene = scene(
         r#"
+        environment = { uniform = [1, 1, 1] }
         mesh = [
             { name = "floor", plane = { size_m = 6, cells = 24 } },
             { name = "wall", cuboid = { size_m = [6, 3, 0.1], cells = 12 } },
             { name = "ball", sphere = { radius_m = 0.6, subdivisions = 4 } },
-            { name = "lamp", sphere = { radius_m = 0.2, subdivisions = 2 } },
         ]
         entity = [
             { mesh = "floor", albedo = [0.2, 0.5, 0.2], position = [0, -0.6, 2] },
             { mesh = "wall", position = [0, 0.8, 4.9], albedo = [0.8, 0.2, 0.1] },
             { mesh = "ball", position = [-0.2, 0.01, 0], albedo = [0.95, 0.95, 0.95], gloss = { roughness = 0.15, metallic = 1 } },
             { mesh = "ball", position = [1.1, -0.1, 0.4], scale = 0.7, albedo = [0.2, 0.3, 0.9], motion = [{ orbit = { centre = [1.1, 0.5, 0], axis = [0, 1, 0], period_s = 4 } }] },
-            { mesh = "lamp", position = [-0.8, 2.6, 2.2], emission = [40, 40, 40], receives = false },
         ]
         "#,
     );
     let [found, wanted] = bounced_once(&gpu, &scene);
-    let error = error(&found, &wanted);
+    let lower = 3 * (SIZE[0] * SIZE[1] / 2) as usize..;
+    let error = error(&found[lower.clone()], &wanted[lower]);
     report(&format!("{error:.4}"));
-    assert!(error < 0.1, "{error}");
+    // 0.064 where its vertices reflect.
+    assert!(error < 0.045, "{error}");
 }
 
 /// The eye changes what is reflected, and nothing is merged for it.

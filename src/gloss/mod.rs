@@ -52,8 +52,8 @@ pub const WIDENED: f64 = 0.35;
 pub const MOST_SLOPES: f64 = 1.0;
 /// Area of a rectangle of light as slopes from which on it is no disc, over pi (1 + p^2), where it lies at p.
 pub const WIDE_OUTLINE: f64 = 0.01;
-/// Where the cosine between the normal and that of a microfacet that mirrors the light's rim, over alpha, is below the first, the
-/// light is a point; above the second it is its outline.
+/// Where the cosine between the normal and that of a microfacet that mirrors the light's rim, over alpha, is below the
+/// first, the light is a point; above the second it is its outline.
 pub const LOW_HALF_Z: [f64; 2] = [0.02, 0.12];
 
 /// A receiver that reflects: its vertices in the buffers of light.

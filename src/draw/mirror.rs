@@ -36,7 +36,7 @@ const MOST_RADIANCE: f32 = 65_504.0;
 
 /// Half of the width of a probe's picture over the tangent of the angle that it shows to each side: less than 1, so that
 /// blur at the edge of a picture finds what the next one shows.
-pub const ZOOM: f64 = 0.8;
+pub const PROBE_ZOOM: f64 = 0.8;
 /// The coarsest level that probes read, and texels of the finest along one of its texels.
 pub const PROBE_LEVEL: u32 = 4;
 const PROBE_COARSEST: u32 = 1 << PROBE_LEVEL;
@@ -54,7 +54,7 @@ pub enum Mirrored {
 
 /// Width and height of a probe's pictures from which on a lobe is wider than the coarsest level's texels.
 pub fn finest_side(roughness: f64) -> f64 {
-    f64::from(2 * PROBE_COARSEST) / (ZOOM * PROBE_SPREAD * (roughness * roughness).max(1e-3))
+    f64::from(2 * PROBE_COARSEST) / (PROBE_ZOOM * PROBE_SPREAD * (roughness * roughness).max(1e-3))
 }
 
 /// What mirrors show, in one picture.

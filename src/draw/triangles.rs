@@ -159,7 +159,7 @@ impl Look<'_> {
             .define("MIRRORED", mirrored != Mirrored::Nothing && detail != Detail::Rough)
             .define("PROBES", mirrored == Mirrored::PlanesAndProbes)
             .define("PROBE_LEVEL", mirror::PROBE_LEVEL)
-            .number("PROBE_ZOOM", mirror::ZOOM)
+            .number("PROBE_ZOOM", mirror::PROBE_ZOOM)
             .number("PROBE_SPREAD", mirror::PROBE_SPREAD)
             .define("MIRROR_BINDING", MIRROR_BINDING)
             .number("MIRROR_SPREAD", mirror::SPREAD)

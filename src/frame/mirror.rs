@@ -6,7 +6,7 @@ use super::viewport::Viewport;
 use super::{Frame, gloss};
 use crate::asset::edges::within_picture;
 use crate::asset::mesh::Mesh;
-use crate::draw::mirror::{Mirrored, ZOOM, finest_side};
+use crate::draw::mirror::{Mirrored, PROBE_ZOOM, finest_side};
 use crate::draw::triangles::Detail;
 use crate::draw::{DrawnEntity, DrawnViewport, PictureLights};
 use crate::gloss::{PIXEL_ROUGHNESS, brdf};
@@ -242,8 +242,10 @@ impl Frame {
                 None => found.push((Place::Plane(plane), vec![face.entity], score)),
             }
         }
+        // Parts of small pictures hold no probe.
         let has_room = mirrors.face_side(f64::INFINITY) > 0;
-        for (entity, centre) in self.reflectors.curved.iter().filter(|_| has_room) {
+        let curved: &[_] = if has_room { &self.reflectors.curved } else { &[] };
+        for (entity, centre) in curved {
             let placement = &placements[*entity];
             let centre = placement.point(*centre);
             let radius_m = self.radius_m(*entity, placement);
@@ -279,11 +281,6 @@ impl Frame {
             share: ((score / least - 1.0) / FADE).min(1.0),
         };
         shown.map(mirror).collect()
-    }
-
-    /// Of the ball around an entity, metres.
-    fn radius_m(&self, entity: usize, placement: &Placement) -> f64 {
-        self.buffers.meshes[self.scene.entities[entity].mesh].radius_m * f64::from(placement.scale)
     }
 
     /// Whether an entity is to be seen in a probe: neither what has it nor what is within that.
@@ -365,7 +362,7 @@ impl Frame {
                         let side = f64::from(probe.side);
                         told.probe = (probe.centre - eye).extend(side).as_vec4().to_array();
                         told.mirror_place = [0.0, 0.0, 0.0, mirror.share as f32];
-                        told.mirror_view = [left, 0.0, 0.5 * side * ZOOM, probe.near_m].map(|x| x as f32);
+                        told.mirror_view = [left, 0.0, 0.5 * side * PROBE_ZOOM, probe.near_m].map(|x| x as f32);
                     }
                 }
             }

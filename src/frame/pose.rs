@@ -89,7 +89,7 @@ impl Frame {
         };
         EntityBounds {
             centre: self.centre(index, placement),
-            radius_m: device_mesh.radius_m * f64::from(placement.scale),
+            radius_m: self.radius_m(index, placement),
             reflectance: entity.reflection().map_or(f64::from(entity.albedo.max_element()), |_| 1.0),
             occludes: entity.occludes
                 && (holds(&device_mesh.blocked)
@@ -111,7 +111,7 @@ impl Frame {
         let rotation = placement.turn();
         let [cos_a, sin_a, cos_b, sin_b, cos_c, sin_c] = turns(rotation).map(|x| x as f32);
         let centre = self.centre(index, placement).as_vec3();
-        let radius_m = device_mesh.radius_m * f64::from(placement.scale);
+        let radius_m = self.radius_m(index, placement);
         let method = self.light_method(index);
         let is_sharp = entity.emits && method.is_sharp();
         let emission = match (&device_mesh.radiance, &device_mesh.slots.lamp_colors) {
@@ -164,6 +164,11 @@ impl Frame {
             blocked_base: device_mesh.blocked.as_ref().map_or(0, FieldSlot::quad),
             radiance_base,
         }
+    }
+
+    /// Radius of an entity's bounding sphere in the world, metres.
+    pub(super) fn radius_m(&self, index: usize, placement: &Placement) -> f64 {
+        self.buffers.meshes[self.scene.entities[index].mesh].radius_m * f64::from(placement.scale)
     }
 
     /// Centre of an entity's bounding sphere in the world, metres.

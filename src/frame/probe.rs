@@ -1,7 +1,7 @@
 //! Probes: what stands around a curved glossy surface, in six pictures from its middle.
 
 use crate::asset::mesh::Mesh;
-use crate::draw::mirror::ZOOM;
+use crate::draw::mirror::PROBE_ZOOM;
 use crate::lists::sight::SightCamera;
 use glam::{DMat4, DVec3, DVec4};
 
@@ -29,7 +29,7 @@ impl Probe {
         let camera = |face: usize| SightCamera {
             clip_from_world: clip_from_world(centre, near_m, face),
             eye: centre,
-            near_m: near_m * (1.0 + 2.0 / (ZOOM * ZOOM)).sqrt(),
+            near_m: near_m * (1.0 + 2.0 / (PROBE_ZOOM * PROBE_ZOOM)).sqrt(),
             size: [side; 2],
             samples: false,
         };
@@ -42,7 +42,7 @@ fn clip_from_world(centre: DVec3, near_m: f64, face: usize) -> DMat4 {
     let axis = |offset: usize| DVec3::AXES[(face / 2 + offset) % 3];
     let forward = if face % 2 == 0 { axis(0) } else { -axis(0) };
     let row = |of: DVec3| of.extend(-of.dot(centre));
-    DMat4::from_cols(row(ZOOM * axis(1)), row(ZOOM * axis(2)), DVec4::W * near_m, row(forward)).transpose()
+    DMat4::from_cols(row(PROBE_ZOOM * axis(1)), row(PROBE_ZOOM * axis(2)), DVec4::W * near_m, row(forward)).transpose()
 }
 
 /// The middle of a surface that mostly faces away from it, so that it hides little of what it reflects.
@@ -81,7 +81,7 @@ mod tests {
             2
         };
         let face = 2 * axis + usize::from(toward[axis] < 0.0);
-        (face, [1, 2].map(|offset| ZOOM * toward[(axis + offset) % 3] / size[axis]))
+        (face, [1, 2].map(|offset| PROBE_ZOOM * toward[(axis + offset) % 3] / size[axis]))
     }
 
     #[test]

@@ -99,8 +99,7 @@ impl Frame {
                 gloss: self.drawn_gloss(entity),
                 by_pixel: self.chains.as_ref().and_then(|chains| chains.of(index)),
             };
-            let radius_m = device_mesh.radius_m * f64::from(placement.scale);
-            let distance_m = self.centre(index, placement).distance(camera.eye) - radius_m;
+            let distance_m = self.centre(index, placement).distance(camera.eye) - self.radius_m(index, placement);
             let place = match entity.transparent {
                 true => (2, -self.box_distance_m(entity.mesh, placement, camera.eye)),
                 false => (u8::from(drawn.mesh.grid().is_some()), distance_m),

@@ -304,8 +304,13 @@ struct Caster<'c> {
 
 impl Caster<'_> {
     fn cast(&self, locals: &[Vec3A]) -> Vec<Option<BlockerHit>> {
+        self.cast_at(self.counts.blocks, locals)
+    }
+
+    /// What rays meet of the members that count.
+    fn cast_at(&self, counts: &[bool], locals: &[Vec3A]) -> Vec<Option<BlockerHit>> {
         let mut hits = Vec::with_capacity(locals.len());
-        self.blockers.first(self.origin, &self.to_blockers, locals, self.counts.blocks, &mut hits);
+        self.blockers.first(self.origin, &self.to_blockers, locals, counts, &mut hits);
         hits
     }
 
@@ -349,20 +354,25 @@ impl Caster<'_> {
     }
 
     /// How far each ray comes past all that the map counts; infinity where it is free.
-    fn map_distances(&self, locals: &[Vec3A], hits: &[Option<BlockerHit>]) -> Vec<f32> {
+    fn map_distances(&self, locals: &[Vec3A]) -> Vec<f32> {
         let in_map = self.counts.in_map.expect("asked for maps alone");
-        let distance = |hit: &Option<BlockerHit>| hit.map_or(f32::INFINITY, |hit| hit.distance);
+        self.cast_at(in_map, locals).iter().map(distance).collect()
+    }
+
+    /// The same of rays whose first hits are known: only those that meet what the map does not count are cast again.
+    fn map_distances_past(&self, locals: &[Vec3A], hits: &[Option<BlockerHit>]) -> Vec<f32> {
+        let in_map = self.counts.in_map.expect("asked for maps alone");
         let mut distances: Vec<f32> = hits.iter().map(distance).collect();
         let is_other = |i: &usize| hits[*i].is_some_and(|hit| !in_map[hit.member as usize]);
         let others: Vec<usize> = (0..hits.len()).filter(is_other).collect();
-        if !others.is_empty() {
-            let locals_of_others: Vec<Vec3A> = others.iter().map(|&i| locals[i]).collect();
-            let mut behind = Vec::with_capacity(others.len());
-            self.blockers.first(self.origin, &self.to_blockers, &locals_of_others, in_map, &mut behind);
-            others.iter().zip(&behind).for_each(|(&i, hit)| distances[i] = distance(hit));
-        }
+        let behind = self.map_distances(&others.iter().map(|&i| locals[i]).collect::<Vec<_>>());
+        others.iter().zip(behind).for_each(|(&i, distance)| distances[i] = distance);
         distances
     }
+}
+
+fn distance(hit: &Option<BlockerHit>) -> f32 {
+    hit.map_or(f32::INFINITY, |hit| hit.distance)
 }
 
 fn locals<'r>(rays: impl IntoIterator<Item = &'r PatternRay>) -> Vec<Vec3A> {
@@ -416,8 +426,7 @@ pub fn see(blockers: &Blockers, standing: &Standing, eye: &Eye, bands: usize, ra
 
 struct CutCell {
     cell: usize,
-    /// Whether an edge of all that blocks crosses it, and one of what the map has.
-    at_edge: bool,
+    /// Whether an edge of what the map has crosses it.
     at_map_edge: bool,
 }
 
@@ -426,10 +435,11 @@ struct CellHits {
     hits: Vec<Option<BlockerHit>>,
     /// Past what the map has; empty without a map.
     distances: Vec<f32>,
-    /// In the order of cells.
+    /// First those that an edge of all that blocks crosses.
     cut: Vec<CutCell>,
-    /// Of the cut cells, one after the other.
+    /// Of those first cut cells, one after the other.
     cut_hits: Vec<Option<BlockerHit>>,
+    /// Of all cut cells past what the map has.
     cut_distances: Vec<f32>,
 }
 
@@ -453,18 +463,25 @@ impl CellHits {
         let with_map = caster.counts.in_map.is_some();
         let toward = locals(&pattern.rays);
         let hits = caster.cast(&toward);
-        let distances = if with_map { caster.map_distances(&toward, &hits) } else { Vec::new() };
-        let cut_cell = |cell: usize| {
-            let at_edge = pattern.is_at_edge(cell, |i| hits[i].is_none());
+        let distances = if with_map { caster.map_distances_past(&toward, &hits) } else { Vec::new() };
+        let at_map_edge = |cell: usize| {
             let is_free = |i: usize| distances[i].is_infinite();
-            let beside = || pattern.cells[cell].neighbours.iter().flatten();
-            let at_map_edge = with_map && beside().any(|&other| is_free(other) != is_free(cell));
-            (at_edge || at_map_edge).then_some(CutCell { cell, at_edge, at_map_edge })
+            let mut beside = pattern.cells[cell].neighbours.iter().flatten();
+            with_map && beside.any(|&other| is_free(other) != is_free(cell))
         };
-        let cut: Vec<CutCell> = (0..PATTERN).filter_map(cut_cell).collect();
-        let cut_toward = locals(cut.iter().flat_map(|cut| &pattern.cells[cut.cell].cuts));
+        let at_edge = |cell: &usize| pattern.is_at_edge(*cell, |i| hits[i].is_none());
+        let (at_edges, others): (Vec<usize>, Vec<usize>) = (0..PATTERN).partition(at_edge);
+        let only_in_map: Vec<usize> = others.into_iter().filter(|&cell| at_map_edge(cell)).collect();
+        let cuts = |cells: &[usize]| locals(cells.iter().flat_map(|&cell| &pattern.cells[cell].cuts));
+        let cut_toward = cuts(&at_edges);
         let cut_hits = caster.cast(&cut_toward);
-        let cut_distances = if with_map { caster.map_distances(&cut_toward, &cut_hits) } else { Vec::new() };
+        let mut cut_distances = Vec::new();
+        if with_map {
+            cut_distances = caster.map_distances_past(&cut_toward, &cut_hits);
+            cut_distances.extend(caster.map_distances(&cuts(&only_in_map)));
+        }
+        let cut = at_edges.into_iter().chain(only_in_map);
+        let cut = cut.map(|cell| CutCell { cell, at_map_edge: at_map_edge(cell) }).collect();
         CellHits { hits, distances, cut, cut_hits, cut_distances }
     }
 
@@ -473,10 +490,8 @@ impl CellHits {
         let pattern = &*MANY_RAYS;
         let mut whole = [true; PATTERN];
         for (cut, hits) in self.cut.iter().zip(self.cut_hits.chunks_exact(CUTS * CUTS)) {
-            if cut.at_edge {
-                whole[cut.cell] = false;
-                pattern.cells[cut.cell].cuts.iter().zip(hits).for_each(|(ray, hit)| add(ray, hit));
-            }
+            whole[cut.cell] = false;
+            pattern.cells[cut.cell].cuts.iter().zip(hits).for_each(|(ray, hit)| add(ray, hit));
         }
         let cells = (0..PATTERN).filter(|cell| whole[*cell]);
         cells.for_each(|cell| add(&pattern.rays[cell], &self.hits[cell]));
@@ -517,7 +532,7 @@ impl CellHits {
                 break;
             }
             let middles: Vec<Vec3A> = wide.iter().map(|edge| edge.middle()).collect();
-            let distances = caster.map_distances(&middles, &caster.cast(&middles));
+            let distances = caster.map_distances(&middles);
             for ((edge, middle), distance) in wide.into_iter().zip(middles).zip(distances) {
                 if distance.is_infinite() {
                     edge.free = middle;
@@ -537,7 +552,7 @@ impl CellHits {
             return map;
         }
         let nodes = &MANY_RAYS.nodes;
-        let here = caster.map_distances(nodes, &caster.cast(nodes));
+        let here = caster.map_distances(nodes);
         let edges: Vec<(Vec3A, f32)> = self.edges(caster).iter().map(|edge| (edge.middle(), edge.away)).collect();
         let mut close = Close { nearest: usize::MAX, places: Vec::new() };
         for (node, &toward) in nodes.iter().enumerate() {

@@ -14,10 +14,13 @@ use std::time::Duration;
 const LANES: usize = 16;
 /// How far beyond its sides a triangle reaches, as a share of them: no ray slips between two neighbours.
 const SLACK: f32 = 1e-5;
+const MIXED: u32 = u32::MAX;
 
 /// Triangles that block, each of one member of a group.
 pub struct Blockers {
     hierarchy: Bvh2,
+    /// For each node of the hierarchy the member that all of its triangles belong to; [`MIXED`] for those of several.
+    owners: Vec<u32>,
     /// In the order of the hierarchy's leaves.
     triangles: Vec<Corners>,
     members: Vec<u32>,
@@ -248,15 +251,18 @@ impl Blockers {
             v2: (*c).into(),
         };
         let unsorted: Vec<Triangle> = of.iter().map(triangle).collect();
-        let hierarchy = build_bvh2_from_tris(&unsorted, BvhBuildParams::slow_build(), &mut Duration::default());
+        let mut hierarchy = build_bvh2_from_tris(&unsorted, BvhBuildParams::slow_build(), &mut Duration::default());
+        hierarchy.reorder_in_stack_traversal_order();
         let corners = |&i: &u32| {
             let Triangle { v0, v1, v2 } = unsorted[i as usize];
             let edges = [v1 - v0, v2 - v0];
             Corners { corner: v0, edges, normal: edges[0].cross(edges[1]) }
         };
+        let members: Vec<u32> = hierarchy.primitive_indices.iter().map(|&i| of[i as usize].member).collect();
         Blockers {
+            owners: owners(&hierarchy, &members),
             triangles: hierarchy.primitive_indices.iter().map(corners).collect(),
-            members: hierarchy.primitive_indices.iter().map(|&i| of[i as usize].member).collect(),
+            members,
             numbers: hierarchy.primitive_indices.iter().map(|&i| of[i as usize].number).collect(),
             backs,
             masks: if masks.iter().any(Option::is_some) { masks } else { Vec::new() },
@@ -304,6 +310,10 @@ impl Blockers {
         let nodes = &self.hierarchy.nodes;
         open.push(0);
         while let Some(index) = open.pop() {
+            let owner = self.owners[index as usize];
+            if owner != MIXED && !counts[owner as usize] {
+                continue;
+            }
             let node = &nodes[index as usize];
             if !packet.enters(simd, node.aabb.min - origin, node.aabb.max - origin) {
                 continue;
@@ -311,7 +321,7 @@ impl Blockers {
             if node.prim_count > 0 {
                 for triangle in node.first_index..node.first_index + node.prim_count {
                     let member = self.members[triangle as usize] as usize;
-                    if !counts[member] {
+                    if owner == MIXED && !counts[member] {
                         continue;
                     }
                     match self.masks.get(member) {
@@ -363,6 +373,21 @@ impl Blockers {
     }
 }
 
+/// The owner of each node of a hierarchy whose children come after their parents.
+fn owners(hierarchy: &Bvh2, members: &[u32]) -> Vec<u32> {
+    let mut owners = vec![MIXED; hierarchy.nodes.len()];
+    for (index, node) in hierarchy.nodes.iter().enumerate().rev() {
+        let first = node.first_index as usize;
+        let below = match node.prim_count {
+            0 => &owners[first..first + 2],
+            count => &members[first..first + count as usize],
+        };
+        let is_one = below.iter().all(|member| *member == below[0]);
+        owners[index] = if is_one { below[0] } else { MIXED };
+    }
+    owners
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -371,13 +396,20 @@ mod tests {
     use crate::sh::quadrature::random_direction;
     use std::sync::Arc;
 
-    /// Against every triangle by itself.
+    /// Against every triangle by itself, where leaves mix two members and where they do not.
     #[test]
     fn packets_find_the_first_triangle() {
+        find_the_first_triangle(|number| number % 2);
+        find_the_first_triangle(|number| u32::from(number >= 288));
+    }
+
+    fn find_the_first_triangle(member_of: impl Fn(u32) -> u32) {
         let mesh = generate::torus(1.0, 0.3, 24, 12);
         let corners: Vec<[Vec3; 3]> = mesh.triangles.iter().map(|t| t.map(|i| mesh.positions[i as usize])).collect();
-        let triangle =
-            |(number, corners): (u32, &[Vec3; 3])| BlockerTriangle { member: number % 2, number, corners: *corners };
+        let triangle = |(number, corners): (u32, &[Vec3; 3])| {
+            let member = member_of(number);
+            BlockerTriangle { member, number, corners: *corners }
+        };
         let blockers = Blockers::new((0..).zip(&corners).map(triangle), Vec::new(), Vec::new());
         let mut rng = fastrand::Rng::with_seed(3);
         let mut hits = Vec::new();
@@ -385,11 +417,11 @@ mod tests {
         for _ in 0..50 {
             let origin = 1.5 * random_direction(&mut rng).as_vec3a();
             let directions: Vec<Vec3A> = (0..37).map(|_| random_direction(&mut rng).as_vec3a()).collect();
-            for only_odd in [false, true] {
-                blockers.first(origin, &Mat3A::IDENTITY, &directions, &[!only_odd, true], &mut hits);
+            for only_second in [false, true] {
+                blockers.first(origin, &Mat3A::IDENTITY, &directions, &[!only_second, true], &mut hits);
                 assert_eq!(hits.len(), directions.len());
                 for (direction, hit) in directions.iter().zip(&hits) {
-                    let counted = corners.iter().enumerate().filter(|(i, _)| !only_odd || i % 2 == 1);
+                    let counted = corners.iter().enumerate().filter(|(i, _)| !only_second || member_of(*i as u32) == 1);
                     let distance = |(_, t): (usize, &[Vec3; 3])| {
                         let [v0, v1, v2] = t.map(Vec3A::from);
                         Triangle { v0, v1, v2 }.intersect(&obvhs::ray::Ray::new_inf(origin, *direction))

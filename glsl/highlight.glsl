@@ -57,11 +57,12 @@ Outline outline_of(View view, mat3 surface, SeenLight light, mat3 axes) {
     return outline;
 }
 
-// The share of a rectangle. Its edges are bent as slopes: each counts as two.
-float share_in_rectangle(View view, mat3 surface, SeenLight light, mat3 axes, Outline outline) {
+// The share of a rectangle, or of the first so many of its edges: a software device leaves a loop early that no lane goes
+// on with, and runs a branch that none takes. Edges are bent as slopes: each counts as two.
+float share_in_rectangle(View view, mat3 surface, SeenLight light, mat3 axes, Outline outline, uint edges) {
     float sum = 0.0;
     vec2 place = vec2(1.0);
-    for (uint k = 0; k < 4; k++) {
+    for (uint k = 0; k < edges; k++) {
         vec2 next = vec2(-place.y, place.x);
         vec2 between = slope_of(view, surface, axes * along_axes(light, 0.5 * (place + next)));
         sum += share_by_edge(outline.ends[k], between) + share_by_edge(between, outline.ends[(k + 1) % 4]);
@@ -81,10 +82,9 @@ float share_in_outline(View view, mat3 surface, SeenLight light, mat3 axes, Outl
     turn = abs(turn) < 1e-20 ? 1e-20 : turn;
     vec2 across = vec2(second.x * middle.y - second.y * middle.x, first.y * middle.x - first.x * middle.y) / turn;
     across = clamp(across, -1e9, 1e9);
-    float share;
-    if (outline.polygon && radius > max(WIDE_OUTLINE * (1.0 + away), footprint)) {
-        share = share_in_rectangle(view, surface, light, axes, outline);
-    } else {
+    bool whole = outline.polygon && radius > max(WIDE_OUTLINE * (1.0 + away), footprint);
+    float share = share_in_rectangle(view, surface, light, axes, outline, whole ? 4 : 0);
+    if (!whole) {
         // An ellipse that is wide counts by where its own outline lies.
         float wide = 16.0 * radius * radius;
         float by_outline = outline.polygon ? 0.0 : wide / max(wide + away * away, 1e-30);

@@ -20,19 +20,12 @@ macro_rules! layer {
             $make: $make_pfn(
                 owner: vk::$owner, info: *const vk::$info<'_>, allocator: *const vk::AllocationCallbacks<'_>,
                 object: *mut vk::$object
-            ) -> vk::Result {
-                if let Some(error) = fault(stringify!($make), $make_error) {
-                    return error;
+            ) -> vk::Result [$make_error] {
+                let result = real(owner, info, allocator, object);
+                if result == vk::Result::SUCCESS {
+                    born(*object);
                 }
-                // SAFETY: the caller keeps the contract of this very function, which writes the handle where it
-                // succeeds.
-                unsafe {
-                    let result = REAL.get().expect("wrapped")(owner, info, allocator, object);
-                    if result == vk::Result::SUCCESS {
-                        born(*object);
-                    }
-                    result
-                }
+                result
             }
         })*
         $(module! {
@@ -40,18 +33,11 @@ macro_rules! layer {
                 owner: vk::$keeper, object: vk::$victim, allocator: *const vk::AllocationCallbacks<'_>
             ) {
                 dies(object);
-                // SAFETY: the caller keeps the contract of this very function.
-                unsafe { REAL.get().expect("wrapped")(owner, object, allocator) }
+                real(owner, object, allocator);
             }
         })*
         $(module! {
-            $other: $other_pfn($($parameter: $type),*) -> vk::Result {
-                if let Some(error) = fault(stringify!($other), $other_error) {
-                    return error;
-                }
-                // SAFETY: the caller keeps the contract of this very function.
-                unsafe { REAL.get().expect("wrapped")($($parameter),*) }
-            }
+            $other: $other_pfn($($parameter: $type),*) -> vk::Result [$other_error] { real($($parameter),*) }
         })*
 
         /// The wrapper of a function, or the function itself where it has none.

@@ -57,7 +57,7 @@ module! {
         let claims = state().claims;
         // SAFETY: the caller keeps the contract of this very function, which writes the struct.
         unsafe {
-            REAL.get().expect("wrapped")(physical, out);
+            real(physical, out);
             claims.change(&mut *out);
         }
     }
@@ -70,7 +70,7 @@ module! {
         let claims = state().claims;
         // SAFETY: the caller keeps the contract of this very function, which writes the struct.
         unsafe {
-            REAL.get().expect("wrapped")(physical, out);
+            real(physical, out);
             claims.change(&mut (*out).properties);
         }
     }
@@ -84,7 +84,7 @@ module! {
         // SAFETY: the caller keeps the contract of this very function, which writes the structs of a chain, each of
         // which begins with its type and the next.
         unsafe {
-            REAL.get().expect("wrapped")(physical, out);
+            real(physical, out);
             let mut next = (*out).p_next.cast::<vk::BaseOutStructure<'_>>();
             while !next.is_null() {
                 if (*next).s_type == vk::StructureType::PHYSICAL_DEVICE_VULKAN_1_3_FEATURES {
@@ -104,7 +104,7 @@ module! {
         // SAFETY: the caller keeps the contract of this very function, which writes `count` structs if there is room
         // for them.
         unsafe {
-            REAL.get().expect("wrapped")(physical, count, out);
+            real(physical, count, out);
             if !out.is_null() {
                 std::slice::from_raw_parts_mut(out, *count as usize).iter_mut().for_each(change);
             }
@@ -119,7 +119,7 @@ module! {
         let Claims { splits_memory: splits, heap_bytes, .. } = state().claims;
         // SAFETY: the caller keeps the contract of this very function, which writes the struct.
         unsafe {
-            REAL.get().expect("wrapped")(physical, out);
+            real(physical, out);
             if let Some(bytes) = heap_bytes {
                 (*out).memory_heaps.iter_mut().for_each(|heap| heap.size = heap.size.min(bytes));
             }
@@ -142,7 +142,7 @@ macro_rules! requirements {
                 let splits = state().claims.splits_memory;
                 // SAFETY: the caller keeps the contract of this very function, which writes the struct.
                 unsafe {
-                    REAL.get().expect("wrapped")(device, object, out);
+                    real(device, object, out);
                     if splits {
                         (*out).memory_type_bits = 1 << OF_DEVICE | 1 << OF_HOST;
                     }

@@ -165,17 +165,20 @@ unsafe extern "system" fn instance_address(instance: vk::Instance, name: *const 
 /// As `vkGetDeviceProcAddr`, with wrappers of the loader's own functions, which serve every device.
 pub unsafe extern "system" fn device_address(device: vk::Device, name: *const c_char) -> Option<Function> {
     let instance = state().instance;
-    let real = vkGetDeviceProcAddr::REAL.get().expect("an instance was loaded before its device");
     // SAFETY: the caller keeps the contract of this very function, and the device keeps its instance alive.
-    let (of_device, of_loader, name) = unsafe { (real(device, name)?, loader()(instance, name), CStr::from_ptr(name)) };
+    let (of_device, of_loader, name) =
+        unsafe { (vkGetDeviceProcAddr::real(device, name)?, loader()(instance, name), CStr::from_ptr(name)) };
     // SAFETY: the name is that of the function.
     let wrapped = of_loader.and_then(|real| unsafe { find(name.to_str().unwrap_or_default(), real) });
     wrapped.filter(|wrapped| Some(*wrapped as usize) != of_loader.map(|real| real as usize)).or(Some(of_device))
 }
 
-/// A module for each function that is wrapped: where the loader's own function is kept, and the wrapper.
+/// A module for each function that is wrapped: where the loader's own function is kept, and the wrapper, which may fail
+/// with errors before all else.
 macro_rules! module {
-    ($name:ident: $pfn:ident($($parameter:ident: $type:ty),*) $(-> $result:ty)? $body:block) => {
+    (
+        $name:ident: $pfn:ident($($parameter:ident: $type:ty),*) $(-> $result:ty)? $([$errors:expr])? { $($body:tt)* }
+    ) => {
         #[allow(non_snake_case)]
         pub mod $name {
             #[allow(unused_imports)]
@@ -194,7 +197,20 @@ macro_rules! module {
 
             /// # Safety
             /// That of the Vulkan function.
-            unsafe extern "system" fn call($($parameter: $type),*) $(-> $result)? $body
+            pub unsafe fn real($($parameter: $type),*) $(-> $result)? {
+                // SAFETY: the caller keeps the contract of this very function.
+                unsafe { REAL.get().expect("wrapped")($($parameter),*) }
+            }
+
+            /// # Safety
+            /// That of the Vulkan function.
+            unsafe extern "system" fn call($($parameter: $type),*) $(-> $result)? {
+                $(if let Some(error) = fault(stringify!($name), $errors) {
+                    return error;
+                })?
+                // SAFETY: the caller keeps the contract of this very function, which writes what the wrapper reads.
+                unsafe { $($body)* }
+            }
         }
     };
 }

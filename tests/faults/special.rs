@@ -27,7 +27,7 @@ module! {
         let has = state().claims.extension;
         // SAFETY: the caller keeps the contract of this very function.
         unsafe {
-            let result = REAL.get().expect("wrapped")(layer, count, out);
+            let result = real(layer, count, out);
             if result == vk::Result::SUCCESS && !out.is_null() {
                 for one in std::slice::from_raw_parts_mut(out, *count as usize) {
                     if one.extension_name_as_c_str().is_ok_and(|name| !has(name)) {
@@ -52,7 +52,7 @@ module! {
             if (*info).object_type == vk::ObjectType::DESCRIPTOR_SET {
                 state().heard.wrong.push("a descriptor set was named, which lavapipe of Mesa 22.3 never frees".into());
             }
-            REAL.get().expect("wrapped")(device, info)
+            real(device, info)
         }
     }
 }
@@ -66,7 +66,7 @@ module! {
         }
         // SAFETY: the caller keeps the contract of this very function, which writes the handle where it succeeds.
         unsafe {
-            let result = REAL.get().expect("wrapped")(info, allocator, out);
+            let result = real(info, allocator, out);
             if result == vk::Result::SUCCESS {
                 born(*out);
                 state().instance = *out;
@@ -80,7 +80,7 @@ module! {
     vkDestroyInstance: PFN_vkDestroyInstance(instance: vk::Instance, allocator: *const Allocator<'_>) {
         dies(instance);
         // SAFETY: the caller keeps the contract of this very function.
-        unsafe { REAL.get().expect("wrapped")(instance, allocator) }
+        unsafe { real(instance, allocator) }
     }
 }
 
@@ -88,7 +88,7 @@ module! {
     vkDestroyDevice: PFN_vkDestroyDevice(device: vk::Device, allocator: *const Allocator<'_>) {
         dies(device);
         // SAFETY: the caller keeps the contract of this very function.
-        unsafe { REAL.get().expect("wrapped")(device, allocator) }
+        unsafe { real(device, allocator) }
     }
 }
 
@@ -107,7 +107,7 @@ module! {
             if splits {
                 own.memory_type_index = 0;
             }
-            let result = REAL.get().expect("wrapped")(device, &raw const own, allocator, out);
+            let result = real(device, &raw const own, allocator, out);
             if result == vk::Result::SUCCESS {
                 born(*out);
                 if splits && (*info).memory_type_index == OF_DEVICE {
@@ -133,7 +133,7 @@ module! {
         }
         drop(state);
         // SAFETY: the caller keeps the contract of this very function.
-        unsafe { REAL.get().expect("wrapped")(device, memory, offset, size, flags, data) }
+        unsafe { real(device, memory, offset, size, flags, data) }
     }
 }
 
@@ -151,7 +151,7 @@ macro_rules! pipelines {
                 }
                 // SAFETY: the caller keeps the contract of this very function, which writes all handles.
                 unsafe {
-                    let result = REAL.get().expect("wrapped")(device, cache, count, infos, allocator, out);
+                    let result = real(device, cache, count, infos, allocator, out);
                     let made = std::slice::from_raw_parts(out, count as usize);
                     made.iter().filter(|pipeline| !pipeline.is_null()).for_each(|pipeline| born(*pipeline));
                     result

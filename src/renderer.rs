@@ -109,6 +109,7 @@ impl Renderer {
         // A caller may place any entity anywhere, and reads light by the vertices of its own meshes.
         frame_options.bake.groups = false;
         frame_options.bake.vertices = 0;
+        frame_options.pictures = false;
         let folder = gpu.device().cache_dir.clone();
         let cache = options.cache.clone().unwrap_or_else(|| Cache::new(folder.as_deref()));
         let baker = Baker::new(gpu.device(), &Library { shader_dir: None, cache_dir: folder });

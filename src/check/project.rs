@@ -117,7 +117,7 @@ pub fn rows(baker: &Baker, add: &mut dyn FnMut(CheckRow)) -> Result<()> {
     let black = Content::new(baker, &generate::torus(1.0, 0.3, 32, 16), &EYES, (32, FieldKind::Occlusion, true))?;
     let bright =
         Content::new(baker, &generate::torus_two_colour(0.5, 0.15, 32, 16), &EYES, (32, FieldKind::Radiance, true))?;
-    for bands in [4, 7] {
+    for bands in 2..=7 {
         for content in [&black, &bright] {
             let (worst, largest) = compare(content, bands)?;
             let worst = if largest > 0.01 { worst } else { f64::INFINITY };

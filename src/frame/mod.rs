@@ -189,18 +189,23 @@ impl Frame {
         if lights.mirrors > 0 && !bounces {
             radiosity.keep_dark()?;
         }
-        let picture = FramePicture::new(device, library, &options, lights)?;
-        // Shaders take long to compile, so that this is done on all cores.
+        let mut picture = FramePicture::new(device, library, &options, lights)?;
+        // Shaders take long to compile, so that this is done on all cores, those that take longest first.
+        picture.draw.is_made = options.pictures;
+        let glossy = reflections.is_some();
+        let drawing = || if options.pictures { picture.make_pipelines(&scene, &buffers, glossy) } else { Ok(()) };
         let merging = || Merge::new(device, library, permutation);
         let lighting = || sharp.map(|permutation| Sharp::new(device, library, permutation)).transpose();
         let bouncing = || linked.map(|linked| Bounce::new(device, library, linked, soft, permutation, self_cells));
-        let (merge, (sharp, bounce)) = rayon::join(merging, || rayon::join(lighting, bouncing));
+        let (drawing, (sharp, (merge, bounce))) =
+            rayon::join(drawing, || rayon::join(lighting, || rayon::join(merging, bouncing)));
+        drawing?;
         let mut bounce = bounce.transpose()?;
         if let Some(bounce) = &mut bounce {
             bounce.set_albedos(&albedos(&scene))?;
             radiosity.keep_direct()?;
         }
-        log::debug!("passes that light are made");
+        log::debug!("all passes are made");
         let entity_room = entity_count.max(permutation.entity_limit as usize);
         let mut sky = SkyLight::new(device, options.bake.bands, buffers.volume_quads())?;
         sky.write(&scene, options.bake.bands)?;

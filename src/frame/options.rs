@@ -36,6 +36,9 @@ pub struct Options {
     pub size: [u32; 2],
     /// How edges are kept from showing as stairs.
     pub antialias: Antialias,
+    /// Whether what draws pictures is compiled beside what lights, and not when the first picture is drawn.
+    #[serde(default)]
+    pub pictures: bool,
 }
 
 impl Options {
@@ -64,6 +67,7 @@ impl Default for Options {
             single_scatter: false,
             size: [960, 640],
             antialias: Antialias::default(),
+            pictures: false,
         }
     }
 }
@@ -191,6 +195,7 @@ impl RenderOptions {
             single_scatter: self.single_scatter,
             size,
             antialias: self.antialias.unwrap_or_default(),
+            pictures: true,
         })
     }
 }

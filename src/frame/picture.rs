@@ -12,7 +12,8 @@ use crate::draw::triangles::DrawnSurface;
 use crate::draw::{Antialias, Draw, DrawnViewport, PictureLights};
 use crate::error::Result;
 use crate::gpu::{Buffer, BufferKind, Device, Image};
-use crate::scene::Placement;
+use crate::scene::{Placement, Scene};
+use crate::scene_buffers::SceneBuffers;
 use crate::shaders::Library;
 use half::f16;
 use std::collections::HashSet;
@@ -52,6 +53,23 @@ impl FramePicture {
             edges: Vec::new(),
         })
     }
+
+    /// Makes the pipelines of all that pictures of a scene show. `glossy`: whether they show its gloss.
+    pub fn make_pipelines(&self, scene: &Scene, buffers: &SceneBuffers, glossy: bool) -> Result<()> {
+        let is_grid = |entity: &usize| buffers.surface(*entity).drawn.grid().is_some();
+        let (grids, triangles): (Vec<usize>, Vec<usize>) = (0..scene.entities.len()).partition(is_grid);
+        let surface = |index: usize| {
+            let paint = scene.paint(index);
+            DrawnSurface {
+                painted: paint.is_some(),
+                detail: gloss::detail(&scene.entities[index]).filter(|_| glossy),
+                transparent: scene.entities[index].transparent,
+                holes: paint.is_some_and(|texture| texture.alpha_cutoff.is_some_and(|cutoff| cutoff > 0.0)),
+            }
+        };
+        let surfaces: HashSet<DrawnSurface> = triangles.into_iter().map(surface).collect();
+        self.draw.make(&surfaces, !grids.is_empty())
+    }
 }
 
 fn readback(device: &Arc<Device>, [width, height]: [u32; 2]) -> Result<Buffer> {
@@ -64,19 +82,7 @@ impl Frame {
         if std::mem::replace(&mut self.picture.draw.is_made, true) {
             return Ok(());
         }
-        let is_grid = |entity: &usize| self.buffers.surface(*entity).drawn.grid().is_some();
-        let (grids, triangles): (Vec<usize>, Vec<usize>) = (0..self.scene.entities.len()).partition(is_grid);
-        let surface = |index: usize| DrawnSurface {
-            painted: self.scene.paint(index).is_some(),
-            detail: gloss::detail(&self.scene.entities[index]).filter(|_| self.reflections.is_some()),
-            transparent: self.scene.entities[index].transparent,
-            holes: self
-                .scene
-                .paint(index)
-                .is_some_and(|texture| texture.alpha_cutoff.is_some_and(|cutoff| cutoff > 0.0)),
-        };
-        let surfaces: HashSet<DrawnSurface> = triangles.into_iter().map(surface).collect();
-        self.picture.draw.make(&surfaces, !grids.is_empty())
+        self.picture.make_pipelines(&self.scene, &self.buffers, self.reflections.is_some())
     }
 
     /// Input of [`super::record()`] for the picture that was prepared last; `white` as in [`Frame::render`].

@@ -261,6 +261,7 @@ fn shapes(baker: &Baker, cache: &Cache, editor: &Editor, options: frame::Options
         dark.put_entity(index, EntityData { emits, occludes, emission, ..data.clone() });
     }
     dark.set_environment(&EnvironmentData { strength: 0.0, ..scene.data.environment.clone() })?;
+    let options = frame::Options { pictures: false, ..options };
     let mut frame = Frame::new(baker, cache, &dark, options, &|_, _, _| ())?;
     let toward = TOWARD.normalize();
     let mut colors = Vec::new();

@@ -84,9 +84,9 @@ impl Boxes {
         edges: &'r Buffer,
     ) -> Result<()> {
         let resources = [
-            inputs.entities.bind(),
+            inputs.entities.clone(),
             Bind::read(self.texels, clusters, vk::Format::R32G32_UINT)?,
-            inputs.vertices.bind(),
+            inputs.vertices.clone(),
             Bind::read(self.texels, baked.ranges, vk::Format::R32G32_UINT)?,
             Bind::read(self.texels, baked.links, vk::Format::R32_UINT)?,
             Bind::read(self.texels, baked.run_places, QUAD_FORMAT)?,

@@ -281,7 +281,7 @@ impl Movers {
         let quads = vk::Format::R32G32B32A32_SFLOAT;
         let shared = || -> Result<[Bind<'r>; 4]> {
             Ok([
-                inputs.entities.bind(),
+                inputs.entities.clone(),
                 Bind::read(texels, &self.entries, vk::Format::R32_UINT)?,
                 Bind::read(texels, places, quads)?,
                 Bind::read(texels, run_light, quads)?,
@@ -294,10 +294,10 @@ impl Movers {
         commands.computed();
         if self.pair_count > 0 {
             let resources = [
-                inputs.entities.bind(),
+                inputs.entities.clone(),
                 Bind::read(texels, &self.entries, vk::Format::R32_UINT)?,
                 Bind::read(texels, &self.clusters, vk::Format::R32G32_UINT)?,
-                inputs.fields.bind(),
+                inputs.fields.clone(),
                 Bind::read(texels, &self.light, quads)?,
                 Bind::read(texels, &self.edges, quads)?,
                 Bind::read(texels, &self.pairs, vk::Format::R32G32_UINT)?,
@@ -308,9 +308,9 @@ impl Movers {
         }
         let of_movers = [
             Bind::read(texels, &self.clusters, vk::Format::R32G32_UINT)?,
-            inputs.fields.bind(),
-            inputs.transfers.bind(),
-            inputs.vertices.bind(),
+            inputs.fields.clone(),
+            inputs.transfers.clone(),
+            inputs.vertices.clone(),
             Bind::read(texels, &self.light, quads)?,
             Bind::read(texels, &self.edges, quads)?,
             Bind::Buffer(&self.incoming),

@@ -33,11 +33,11 @@ use crate::bounce::{Bounce, BounceWork, Bounces, Linked, LinkedEntity};
 use crate::draw::Shading;
 use crate::error::Result;
 use crate::gloss::Reflections;
-use crate::gpu::{self, Buffer, Commands, Device, Timing};
+use crate::gpu::{self, Bind, Buffer, Commands, Device, Timing};
 use crate::layout::{CLUSTER_FORMAT, ENTRY_FORMAT, QUAD_FORMAT};
 use crate::lists::incremental::{ClusterLists, Merged};
 use crate::merge::variant::{MergePermutation, Reads, Variant, uniform_entities};
-use crate::merge::{Merge, MergeInputs, Readable, calibrate};
+use crate::merge::{Merge, MergeInputs, calibrate};
 use crate::scene::groups::Groups;
 use crate::scene::{LightMethod, Lights, Placement, Scene, light};
 use crate::scene_buffers::{SceneBuffers, limits};
@@ -57,7 +57,6 @@ pub use memory::PictureMemory;
 #[cfg(feature = "cli")]
 pub use options::picture_size;
 pub use options::{Options, RenderOptions};
-pub use prepare::Relight;
 pub use record::{MergeWork, PictureTarget, PictureWork, record};
 pub use viewport::{RadiositySource, Viewport};
 
@@ -111,7 +110,7 @@ impl Frame {
         let device = baker.device();
         let library = baker.library();
         let needs = SceneNeeds::of(scene, &options.baked(), options.lights);
-        limits::check(device, scene, &needs)?;
+        limits::check(device, &needs)?;
         PictureMemory::new(device, &options).check(device)?;
         let mut baked = bake::ensure(baker, cache, scene, &needs, progress)?;
         log::debug!("all that is baked is there");
@@ -235,9 +234,6 @@ impl Frame {
     /// given: radiance above it is brought down to it, hue kept, before samples are averaged, so that edges of lights
     /// are smooth; infinity leaves radiance as it is. The host can read the picture afterwards. Returns each pass's
     /// duration.
-    ///
-    /// While entities move a picture lights only what it may show ([`crate::lists::skip::Skip::hidden`]). Without
-    /// `white` everything is lit, for those who want radiosity rather than a picture.
     pub fn render(&mut self, placements: &[Placement], white: Option<f32>) -> Result<Vec<Timing>> {
         self.light_and_draw(placements, white, true)
     }
@@ -249,7 +245,7 @@ impl Frame {
 
     fn light_and_draw(&mut self, placements: &[Placement], white: Option<f32>, reads: bool) -> Result<Vec<Timing>> {
         let viewports: &[Viewport] = if white.is_some() { &[self.whole()] } else { &[] };
-        let outcome = self.prepare(placements, viewports, Relight::Seen).and_then(|()| {
+        let outcome = self.prepare(placements, viewports, true).and_then(|()| {
             let picture = white.map(|white| self.picture_work(placements, white));
             self.run(self.merge_work()?.as_ref(), picture.as_ref(), reads)
         });
@@ -262,7 +258,7 @@ impl Frame {
 
     /// Draws the picture from the radiosity as it stands.
     pub fn redraw(&mut self, placements: &[Placement], white: f32) -> Result<Vec<Timing>> {
-        self.prepare(placements, &[self.whole()], Relight::Nothing)?;
+        self.prepare(placements, &[self.whole()], false)?;
         self.run(None, Some(&self.picture_work(placements, white)), true)
     }
 
@@ -271,7 +267,7 @@ impl Frame {
     pub fn draw_comparison(&mut self, placements: &[Placement], background: [f32; 3]) -> Result<Vec<Timing>> {
         let radiosity = RadiositySource::Comparison(0);
         let viewport = Viewport { radiosity, adds_emission: false, ..self.whole() };
-        self.prepare(placements, &[viewport], Relight::Nothing)?;
+        self.prepare(placements, &[viewport], false)?;
         let picture = self.picture_work(placements, f32::INFINITY);
         self.run(None, Some(&PictureWork { background: background.into(), ..picture }), true)
     }
@@ -335,14 +331,15 @@ impl Frame {
     }
 
     fn inputs(&self, permutation: &MergePermutation) -> Result<MergeInputs<'_>> {
+        let read = |buffer, format| Bind::read(permutation.variant.reads == Reads::Texels, buffer, format);
         Ok(MergeInputs {
-            entities: Readable::new(&self.work.entities, permutation.variant, QUAD_FORMAT)?,
-            entries: Readable::new(&self.work.entries, permutation.variant, ENTRY_FORMAT)?,
-            clusters: Readable::new(&self.work.clusters, permutation.variant, CLUSTER_FORMAT)?,
-            fields: Readable::new(&self.buffers.fields, permutation.variant, permutation.field_format())?,
-            transfers: Readable::new(&self.buffers.transfers, permutation.variant, QUAD_FORMAT)?,
-            vertices: Readable::new(&self.buffers.vertices, permutation.variant, QUAD_FORMAT)?,
-            sky: Readable::new(&self.sky.coefficients, permutation.variant, QUAD_FORMAT)?,
+            entities: read(&self.work.entities, QUAD_FORMAT)?,
+            entries: read(&self.work.entries, ENTRY_FORMAT)?,
+            clusters: read(&self.work.clusters, CLUSTER_FORMAT)?,
+            fields: read(&self.buffers.fields, permutation.field_format())?,
+            transfers: read(&self.buffers.transfers, QUAD_FORMAT)?,
+            vertices: read(&self.buffers.vertices, QUAD_FORMAT)?,
+            sky: read(&self.sky.coefficients, QUAD_FORMAT)?,
             through: self.kept_for_gloss().map(|[through, ..]| through),
         })
     }
@@ -398,11 +395,6 @@ impl Frame {
 
     pub fn receiver_vertex_count(&self) -> usize {
         self.work.lists.clusters.iter().map(|cluster| cluster.vertex_count as usize).sum()
-    }
-
-    /// Clusters whose light is of an earlier time, as no picture since then showed them.
-    pub fn stale_count(&self) -> usize {
-        self.work.lists.stale_count()
     }
 
     /// Whether any light goes through spherical harmonics, so that transfer vectors are baked.

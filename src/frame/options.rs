@@ -95,7 +95,7 @@ pub struct RenderOptions {
     ///   passed   occluders that no ray to a sharp light meets
     ///   covered  sharp lights that one occluder covers whole
     ///   unmoved  clusters of vertices for which nothing has changed
-    ///   hidden   clusters of vertices that the camera cannot see, while entities move
+    ///   hidden   triangles that the camera cannot see, and reflections that it cannot
     /// Skips with * change pictures a little; the others do not change what is shown
     #[cfg_attr(
         feature = "cli",

@@ -20,17 +20,6 @@ use crate::sharp::{Sharp, SharpPermutation};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-/// Which light a frame brings up to date.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Relight {
-    Nothing,
-    /// That of dirty clusters which may be seen in viewports that show merged light. Where there are none, or nothing
-    /// has changed since the last call, that of every dirty cluster.
-    Seen,
-    /// That of every dirty cluster.
-    Everything,
-}
-
 /// What is kept from frame to frame to tell which clusters have changed, and what a merge reads of them.
 pub(super) struct ClusterWork {
     pub lists: ClusterLists,
@@ -72,15 +61,13 @@ impl ClusterWork {
 }
 
 impl Frame {
-    /// Prepares a frame that lights `relight` and draws `viewports`, if there are any. Where it lights, the merge has
-    /// to be recorded next, or every cluster is merged again.
-    pub fn prepare(&mut self, placements: &[Placement], viewports: &[Viewport], relight: Relight) -> Result<()> {
-        // Light comes from what no viewport shows, too.
+    /// Prepares a frame that draws `viewports`, if there are any. Where it `relights` dirty clusters, the merge has to be
+    /// recorded next, or every cluster is merged again.
+    pub fn prepare(&mut self, placements: &[Placement], viewports: &[Viewport], relights: bool) -> Result<()> {
         self.picture.mirrors = self.mirrors_of(placements, viewports);
-        let relight = if relight == Relight::Seen && self.bounce.is_some() { Relight::Everything } else { relight };
-        if relight != Relight::Nothing {
+        if relights {
             self.fit_edges()?;
-            self.prepare_merge(placements, if relight == Relight::Seen { viewports } else { &[] })?;
+            self.prepare_merge(placements)?;
             self.fit_lists()?;
         }
         if viewports.iter().any(Viewport::shows_light) {
@@ -95,24 +82,18 @@ impl Frame {
     }
 
     /// The dirty clusters and their lists.
-    fn prepare_merge(&mut self, placements: &[Placement], viewports: &[Viewport]) -> Result<()> {
+    fn prepare_merge(&mut self, placements: &[Placement]) -> Result<()> {
         let state = self.state(placements);
-        let mut cameras = self.lit_cameras(viewports);
-        if !cameras.is_empty() {
-            cameras.extend(self.picture.mirrors.iter().flat_map(|mirror| mirror.cameras()).copied());
-        }
-        let sights = self.sights(placements, &cameras);
         let work = &mut self.work;
         if !std::mem::replace(work.recorded.get_mut(), false) {
             work.lists.forget();
         }
-        let dirty = work.lists.update(state, sights.as_deref());
+        let dirty = work.lists.update(state);
         let (clusters, entries) = work.lists.gather(&dirty);
         work.merged = Merged {
             clusters: work.lists.clusters.len(),
             merged_clusters: dirty.iter().map(Dirty::cluster_count).sum(),
             merged_entries: entries.len(),
-            stale_clusters: work.lists.stale_count(),
         };
         if dirty.is_empty() {
             return Ok(());

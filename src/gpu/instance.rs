@@ -48,12 +48,8 @@ fn check_loader(entry: &ash::Entry, validation: Validation, surface: &[&'static 
         ));
     }
     // SAFETY: as above.
-    let extensions = match unsafe { entry.enumerate_instance_extension_properties(None) } {
-        Err(vk::Result::ERROR_OUT_OF_HOST_MEMORY) if let Some(broken) = loader::broken_manifest() => {
-            return Err(broken);
-        }
-        other => other.checked("vkEnumerateInstanceExtensionProperties", "instance")?,
-    };
+    let extensions = unsafe { entry.enumerate_instance_extension_properties(None) }
+        .checked("vkEnumerateInstanceExtensionProperties", "instance")?;
     let has = |name: &CStr| extensions.iter().any(|e| e.extension_name_as_c_str() == Ok(name));
     if let Some(missing) = surface.iter().find(|name| !has(name)) {
         let missing = missing.to_string_lossy();
@@ -99,9 +95,6 @@ impl Instance {
         let handle = match unsafe { entry.create_instance(&create, None) } {
             // The loader returns this code when it finds no driver.
             Err(vk::Result::ERROR_INCOMPATIBLE_DRIVER) => return Err(loader::no_driver()),
-            Err(vk::Result::ERROR_OUT_OF_HOST_MEMORY) if let Some(broken) = loader::broken_manifest() => {
-                return Err(broken);
-            }
             other => other.checked("vkCreateInstance", "instance")?,
         };
         let own = OwnInstance { entry, debug: None, has_debug_utils };

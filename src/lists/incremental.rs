@@ -4,9 +4,6 @@
 //! What a cluster's merge reads is its receiver, its list and the entities on it, and nothing else that ever changes;
 //! and what keeps an entity on or off a list is that entity, the receiver and, for an occluder, a light that stands
 //! there itself. So a cluster for which none of these has changed would come to the same bits again.
-//!
-//! What the camera cannot see is left as it is while things move, and remembered as stale: it is merged once it may be
-//! seen, or once nothing moves any more.
 
 use crate::layout::{self, ListEntry, OWN_MAPS};
 use crate::lists::far::{self, Cut, FarRuns};
@@ -71,7 +68,6 @@ pub(crate) struct ClusterLists {
     now: Option<State>,
     /// Every cluster has changed since the last update by something that no [`State`] holds, as the sky.
     pub renewed: bool,
-    stale: Vec<bool>,
 }
 
 /// Words before the runs of a list of [`ClusterLists::reflectors`].
@@ -124,8 +120,6 @@ pub struct Merged {
     pub merged_clusters: usize,
     /// Lookups in the lists of those, one for 64 vertices.
     pub merged_entries: usize,
-    /// Clusters that have changed since they were merged and are not seen.
-    pub stale_clusters: usize,
 }
 
 impl ClusterLists {
@@ -153,7 +147,6 @@ impl ClusterLists {
             self.clusters.push(cluster);
             self.bounds.push(bounds);
             self.faces.push(faces);
-            self.stale.push(false);
         }
     }
 
@@ -189,38 +182,22 @@ impl ClusterLists {
         self.now = None;
     }
 
-    /// Brings the lists to this time and returns the clusters to merge: those that have changed, and where `sights` are
-    /// given, of every entity, those of them that may be seen by one. At first and where nothing has changed since the
-    /// last update, none is left out.
-    pub fn update(&mut self, now: State, sights: Option<&[Vec<Sight>]>) -> Vec<Dirty> {
-        let before = self.now.take();
-        let first = before.is_none();
+    /// Brings the lists to this time and returns the clusters to merge: all at first, and then those that have changed.
+    pub fn update(&mut self, now: State) -> Vec<Dirty> {
         let renewed = std::mem::take(&mut self.renewed);
+        let before = self.now.take();
         let before = before.filter(|before| !renewed && now.scene_bounds.is_like(&before.scene_bounds));
-        let moved = before.as_ref().map(|before| Moved::new(before, &now));
-        let at_rest = moved.as_ref().is_some_and(|moved| moved.list.is_empty());
-        let sights = sights.filter(|_| now.scene_bounds.skip.hidden && !first && !at_rest);
         // Without the skip all clusters count as changed.
-        let moved = moved.filter(|_| now.scene_bounds.skip.unmoved);
-        let found: Vec<(Dirty, Vec<usize>)> = if moved.is_some() && at_rest && self.stale_count() == 0 {
+        let before = before.filter(|_| now.scene_bounds.skip.unmoved);
+        let moved = before.as_ref().map(|before| Moved::new(before, &now));
+        let dirty = if moved.as_ref().is_some_and(|moved| moved.list.is_empty()) {
             Vec::new()
         } else {
             let groups = (0..self.groups.len()).into_par_iter();
-            groups.filter_map(|group| self.changed(group, &now, moved.as_ref(), sights)).collect()
+            groups.filter_map(|group| self.changed(group, &now, moved.as_ref())).collect()
         };
-        let mut dirty = Vec::with_capacity(found.len());
-        for (seen, hidden) in found {
-            seen.clusters.iter().for_each(|&cluster| self.stale[cluster] = false);
-            hidden.iter().for_each(|&cluster| self.stale[cluster] = true);
-            dirty.extend((!seen.clusters.is_empty()).then_some(seen));
-        }
         self.now = Some(now);
         dirty
-    }
-
-    /// Clusters that have changed since they were merged.
-    pub fn stale_count(&self) -> usize {
-        self.stale.iter().filter(|stale| **stale).count()
     }
 
     /// Clusters of these receivers, those alone that may be seen where `sights` are given.
@@ -253,14 +230,8 @@ impl ClusterLists {
         self.now.as_ref().expect("updated before")
     }
 
-    /// Clusters of a group that have changed since they were merged: those that may be seen, and the others.
-    fn changed(
-        &self,
-        index: usize,
-        now: &State,
-        moved: Option<&Moved<'_>>,
-        sights: Option<&[Vec<Sight>]>,
-    ) -> Option<(Dirty, Vec<usize>)> {
+    /// Clusters of a group that have changed since they were merged, if any have.
+    fn changed(&self, index: usize, now: &State, moved: Option<&Moved<'_>>) -> Option<Dirty> {
         let group = &self.groups[index];
         let mut clusters: Vec<usize> = group.clusters.clone().collect();
         if let Some(moved) = moved.filter(|moved| !(moved.merges_all || moved.flags[group.receiver])) {
@@ -268,14 +239,9 @@ impl ClusterLists {
             let on_list = |cluster: usize| {
                 !near.is_empty() && moved.any_on_list(now, group.receiver, &self.bounds[cluster], &near)
             };
-            clusters.retain(|&cluster| self.stale[cluster] || on_list(cluster));
+            clusters.retain(|&cluster| on_list(cluster));
         }
-        if clusters.is_empty() {
-            return None;
-        }
-        let is_seen = |cluster: &usize| sights.is_none_or(|sights| self.is_seen(*cluster, sights));
-        let (seen, hidden) = clusters.into_iter().partition(is_seen);
-        Some((Dirty { group: index, clusters: seen }, hidden))
+        (!clusters.is_empty()).then_some(Dirty { group: index, clusters })
     }
 
     /// What may matter to a group at a time.

@@ -65,7 +65,7 @@ skips! {
     grouped "static": None;
     /// Clusters of vertices for which nothing has changed since they were last merged.
     unmoved "unmoved": None;
-    /// Clusters that the camera cannot see, in pictures of a moving scene, and triangles that it cannot see.
+    /// Triangles that the camera cannot see, and the reflections of clusters that it cannot.
     hidden "hidden": None;
 }
 

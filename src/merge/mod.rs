@@ -15,35 +15,22 @@ use crate::error::Result;
 use crate::gpu::{Bind, Buffer, Commands, ComputePipeline, Device};
 use crate::layout::CLUSTER_VERTICES;
 use crate::shaders::Library;
-use ash::vk;
 use std::sync::Arc;
 pub use variant::Variant;
-use variant::{MergePermutation, Reads};
+use variant::MergePermutation;
 
-/// A resource that a variant reads as a block or through a texel view.
-pub struct Readable<'b>(Bind<'b>);
-
-impl<'b> Readable<'b> {
-    pub fn new(buffer: &'b Buffer, variant: Variant, format: vk::Format) -> Result<Self> {
-        Ok(Readable(Bind::read(variant.reads == Reads::Texels, buffer, format)?))
-    }
-
-    pub fn bind(&self) -> Bind<'b> {
-        self.0.clone()
-    }
-}
-
+/// What the pass reads, as its variant does: as blocks or through texel views ([`Bind::read`]).
 pub struct MergeInputs<'b> {
     /// The same in a whole workgroup: some variants read them as a uniform block.
-    pub entities: Readable<'b>,
-    pub entries: Readable<'b>,
-    pub clusters: Readable<'b>,
-    pub fields: Readable<'b>,
-    pub transfers: Readable<'b>,
-    pub vertices: Readable<'b>,
+    pub entities: Bind<'b>,
+    pub entries: Bind<'b>,
+    pub clusters: Bind<'b>,
+    pub fields: Bind<'b>,
+    pub transfers: Bind<'b>,
+    pub vertices: Bind<'b>,
     /// Coefficients of the sky, a channel after the other, [`crate::field::quantity::channel_stride`] floats apart;
     /// zero without one.
-    pub sky: Readable<'b>,
+    pub sky: Bind<'b>,
     /// Where the transfer at the end of the sky's chain goes, in the permutation that keeps it.
     pub through: Option<&'b Buffer>,
 }
@@ -68,13 +55,13 @@ impl Merge {
         cluster_count: u32,
     ) -> Result<()> {
         let resources = [
-            inputs.entities.bind(),
-            inputs.entries.bind(),
-            inputs.clusters.bind(),
-            inputs.fields.bind(),
-            inputs.transfers.bind(),
-            inputs.vertices.bind(),
-            inputs.sky.bind(),
+            inputs.entities.clone(),
+            inputs.entries.clone(),
+            inputs.clusters.clone(),
+            inputs.fields.clone(),
+            inputs.transfers.clone(),
+            inputs.vertices.clone(),
+            inputs.sky.clone(),
             Bind::Buffer(radiosity),
             inputs.through.map_or(Bind::None, Bind::Buffer),
         ];

@@ -4,11 +4,11 @@
 use crate::error::{Error, Result};
 use crate::field::Lattice;
 use crate::field::quantity::{Storage, channel_stride};
-use crate::gpu::{Buffer, BufferKind, Commands, Device};
+use crate::gpu::{Bind, Buffer, BufferKind, Commands, Device};
 use crate::layout::{CLUSTER_FORMAT, CLUSTER_VERTICES, Cluster, DeviceEntity, ENTRY_FORMAT, ListEntry, NONE};
 use crate::lists::skip::Skip;
-use crate::merge::variant::{MergePermutation, Variant, uniform_entities};
-use crate::merge::{Merge, MergeInputs, Readable};
+use crate::merge::variant::{MergePermutation, Reads, Variant, uniform_entities};
+use crate::merge::{Merge, MergeInputs};
 use crate::sh::rotation::turns;
 use crate::shaders::Library;
 use ash::vk;
@@ -136,15 +136,16 @@ impl Workload {
 
     fn inputs(&self, variant: Variant) -> Result<MergeInputs<'_>> {
         let floats = vk::Format::R32G32B32A32_SFLOAT;
+        let read = |buffer, format| Bind::read(variant.reads == Reads::Texels, buffer, format);
         Ok(MergeInputs {
             through: None,
-            entities: Readable::new(&self.entities, variant, floats)?,
-            entries: Readable::new(&self.entries, variant, ENTRY_FORMAT)?,
-            clusters: Readable::new(&self.clusters, variant, CLUSTER_FORMAT)?,
-            fields: Readable::new(&self.fields, variant, self.permutation(variant).field_format())?,
-            transfers: Readable::new(&self.transfers, variant, floats)?,
-            vertices: Readable::new(&self.vertices, variant, floats)?,
-            sky: Readable::new(&self.sky, variant, floats)?,
+            entities: read(&self.entities, floats)?,
+            entries: read(&self.entries, ENTRY_FORMAT)?,
+            clusters: read(&self.clusters, CLUSTER_FORMAT)?,
+            fields: read(&self.fields, self.permutation(variant).field_format())?,
+            transfers: read(&self.transfers, floats)?,
+            vertices: read(&self.vertices, floats)?,
+            sky: read(&self.sky, floats)?,
         })
     }
 

@@ -66,8 +66,7 @@ impl Viewer {
     pub(super) fn compare(&mut self) -> Result<()> {
         let (Some(frame), Some(reference)) = (&mut self.frame, &self.reference) else { return Ok(()) };
         let known = self.error_shown.map(|(version, rays, _)| (version, rays));
-        // Where some clusters are out of date, the next frame merges them.
-        if frame.stale_count() > 0 || known == Some((self.version, reference.rays)) {
+        if known == Some((self.version, reference.rays)) {
             return Ok(());
         }
         let map = ErrorMap::new(&error_map::radiosity(frame)?, &reference.radiosity);

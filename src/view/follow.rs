@@ -130,7 +130,7 @@ impl Viewer {
             worker.report("shadows", 0, all);
             let device = Device::new(&options)?;
             let baker = Baker::new(&device, &library);
-            limits::check(&device, &scene, &needs)?;
+            limits::check(&device, &needs)?;
             let told = |what: &str, now: u32, of: u32| {
                 let Some(place) = missing.iter().position(|(name, _)| name == what) else { return };
                 let before: u32 = missing[..place].iter().map(|(_, captures)| captures).sum();

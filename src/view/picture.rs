@@ -9,15 +9,11 @@ use crate::asset::edges::Edges;
 use crate::asset::picture;
 use crate::draw::camera::{clip_from_world, world_from_centred};
 use crate::error::{Error, Result};
-use crate::frame::{self, RadiositySource, Relight, Viewport, record};
+use crate::frame::{self, RadiositySource, Viewport, record};
 use crate::gpu::{Access, Commands, FLIGHTS, Image, Window};
 use glam::{DVec2, DVec4};
 use std::path::{Path, PathBuf};
-use std::time::{Duration, Instant};
-
-/// Time without events after which hidden clusters are lit. It is longer than the interval between events of a drag,
-/// and short enough not to be noticed.
-const REST: Duration = Duration::from_millis(100);
+use std::time::Instant;
 
 pub enum FrameTarget<'c> {
     Window(&'c mut Window),
@@ -64,9 +60,7 @@ impl Viewer {
         let changed = Changed { display: false, selection: false, ..pending }.any();
         let resizes = self.frame.as_ref().is_some_and(|frame| frame.size() != size);
         let [redraws, relights] = self.refine(changed || resizes)?;
-        // Clusters that were hidden during motion are lit when motion has ended.
-        let stale = self.frame.as_ref().is_some_and(|frame| frame.stale_count() > 0);
-        let light = self.frame.is_some() && (pending.light() || stale || relights);
+        let light = self.frame.is_some() && (pending.light() || relights);
         let mut frame = self.frame.as_mut();
         if let (None, Some(preview)) = (&frame, &mut self.preview) {
             // One without shadows has no suns, which stand behind the entities of the file.
@@ -79,13 +73,7 @@ impl Viewer {
         let draws = pending.any() && !stands || resized || redraws;
         if let Some(frame) = &mut frame {
             frame.resize(size)?;
-            let relight = match light {
-                false => Relight::Nothing,
-                // The error needs all clusters, not only the visible ones.
-                true if self.editor.error => Relight::Everything,
-                true => Relight::Seen,
-            };
-            frame.prepare(&placements, if draws { &viewports } else { &[] }, relight)?;
+            frame.prepare(&placements, if draws { &viewports } else { &[] }, light)?;
         }
         self.overlay.prepare(&self.paint, size)?;
         let frame = frame.as_deref();
@@ -113,10 +101,6 @@ impl Viewer {
         self.flights.push_back(flight);
         if !is_shown {
             self.repaint_at = Some(Instant::now());
-        }
-        if self.frame.as_ref().is_some_and(|frame| frame.stale_count() > 0) {
-            let soon = Instant::now() + REST;
-            self.repaint_at = Some(self.repaint_at.map_or(soon, |at| at.min(soon)));
         }
         assert!(self.setup.device.flight_count() <= FLIGHTS, "more than {FLIGHTS} frames are queued");
         self.frame_count += 1;

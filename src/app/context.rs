@@ -3,11 +3,12 @@
 use super::output::{self, Progress};
 use crate::bake::{Baker, cache::Cache};
 use crate::error::{Error, Result};
+use crate::files;
+use crate::frame;
 use crate::gpu::{self, Device, Validation};
 use crate::merge::calibrate;
 use crate::scene::Scene;
 use crate::shaders::Library;
-use crate::{files, frame};
 use clap::Args;
 use std::path::PathBuf;
 use std::sync::Arc;

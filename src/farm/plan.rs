@@ -1,9 +1,12 @@
 //! A plan: meshes to bake and films to render, cut into slices, with everything that decides the bytes of each.
 
+use crate::asset;
+use crate::bake;
 pub use crate::bake::PROGRAM;
 use crate::error::{Error, Result, one_line};
+use crate::frame;
 use crate::gpu::Device;
-use crate::{asset, bake, frame, text};
+use crate::text;
 use serde::{Deserialize, Serialize};
 use serde_json::json;
 use std::path::{Path, PathBuf};

@@ -124,29 +124,6 @@ fn a_picture_larger_than_memory_is_refused_with_numbers() {
     assert!(!folder.at("cache/fields").exists() && !folder.at("p.png").exists());
 }
 
-/// Shaders take long to compile: the terminal says so, unless it is to be left alone.
-#[test]
-fn a_terminal_is_told_what_is_compiled() {
-    if !crate::cli::has_device() {
-        return;
-    }
-    let terminal = |more: &str| {
-        let folder = folder();
-        let program = env!("CARGO_BIN_EXE_shadow-fields");
-        let line = format!("'{program}' {RENDER} -o p.png --antialias none --variant storage --cache-dir cache {more}");
-        // `script` runs a command on a terminal of its own and prints what that shows.
-        let mut script = Command::new("script");
-        let ran = script.current_dir(folder.path()).env("TERM", "xterm").args(["-qec", &line, "/dev/null"]).output();
-        ran.ok().map(|ran| (ran.status.success(), String::from_utf8_lossy(&ran.stdout).into_owned()))
-    };
-    let Some((good, shown)) = terminal("") else { return common::skip("no script (Debian's package is bsdutils)") };
-    assert!(good && shown.contains("compiling shaders, "), "{shown}");
-    for more in ["--quiet", "--no-progress"] {
-        let (good, shown) = terminal(more).unwrap();
-        assert!(good && !shown.contains("compiling"), "{shown}");
-    }
-}
-
 #[test]
 fn a_broken_description_of_a_driver_is_no_driver() {
     let folder = Folder::of(&[("icd.json", "{ \"ICD\": \u{1b}")]);

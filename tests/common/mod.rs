@@ -137,6 +137,13 @@ impl Gpu {
         (0..placements.len()).map(|entity| frame.radiosity(entity).unwrap()).collect()
     }
 
+    /// A picture of a scene at its start, linear RGB.
+    pub fn picture(&self, scene: &Scene, options: frame::Options, white: f32) -> Vec<f32> {
+        let mut frame = self.frame(scene, options);
+        frame.render(&scene.at(0.0), Some(white)).unwrap();
+        frame.picture()
+    }
+
     /// What comes of recordings without the barrier of that index.
     pub fn without_barrier<R>(&self, index: usize, record: impl FnOnce() -> R) -> R {
         self.device.omit_barrier(Some(index));

@@ -2,10 +2,11 @@
 
 #![allow(dead_code)] // every test binary uses its own part
 
-use super::common::parse;
+use super::common::{parse, relative_rms};
 use glam::{EulerRot, Quat, Vec3};
 use shadow_fields::frame;
 use shadow_fields::scene::{Placement, Scene};
+use shadow_fields::truth::{Estimate, Vertex};
 
 /// Few samples of few texels in f32: quick, and all that a comparison with a twin needs. The variant is pinned.
 pub fn small() -> frame::Options {
@@ -36,4 +37,10 @@ pub fn difference(a: &[[f32; 3]], b: &[[f32; 3]]) -> (f32, f32) {
     let pairs = || a.iter().flatten().zip(b.iter().flatten());
     assert!(pairs().all(|(a, b)| a.is_finite() && b.is_finite()), "a radiosity is not finite");
     (pairs().fold(0.0, |m, (a, b)| m.max((a - b).abs())), pairs().fold(0.0, |m, (_, b)| m.max(b.abs())))
+}
+
+/// Relative root mean square error of the light on vertices, of every entity in turn, against what rays bring there.
+pub fn against_rays(light: &[Vec<[f32; 3]>], vertices: &[Vertex], rays: &[Estimate]) -> f64 {
+    let found = vertices.iter().flat_map(|vertex| light[vertex.entity][vertex.index]).map(f64::from);
+    relative_rms(found.zip(rays.iter().flat_map(|truth| truth.radiosity)))
 }

@@ -55,11 +55,8 @@ module! {
         physical: vk::PhysicalDevice, out: *mut vk::PhysicalDeviceProperties
     ) {
         let claims = state().claims;
-        // SAFETY: the caller keeps the contract of this very function, which writes the struct.
-        unsafe {
-            real(physical, out);
-            claims.change(&mut *out);
-        }
+        real(physical, out);
+        claims.change(&mut *out);
     }
 }
 
@@ -68,11 +65,8 @@ module! {
         physical: vk::PhysicalDevice, out: *mut vk::PhysicalDeviceProperties2<'_>
     ) {
         let claims = state().claims;
-        // SAFETY: the caller keeps the contract of this very function, which writes the struct.
-        unsafe {
-            real(physical, out);
-            claims.change(&mut (*out).properties);
-        }
+        real(physical, out);
+        claims.change(&mut (*out).properties);
     }
 }
 
@@ -81,17 +75,14 @@ module! {
         physical: vk::PhysicalDevice, out: *mut vk::PhysicalDeviceFeatures2<'_>
     ) {
         let change = state().claims.features;
-        // SAFETY: the caller keeps the contract of this very function, which writes the structs of a chain, each of
-        // which begins with its type and the next.
-        unsafe {
-            real(physical, out);
-            let mut next = (*out).p_next.cast::<vk::BaseOutStructure<'_>>();
-            while !next.is_null() {
-                if (*next).s_type == vk::StructureType::PHYSICAL_DEVICE_VULKAN_1_3_FEATURES {
-                    change(&mut *next.cast());
-                }
-                next = (*next).p_next.cast();
+        real(physical, out);
+        // Each struct of a chain begins with its type and the next.
+        let mut next = (*out).p_next.cast::<vk::BaseOutStructure<'_>>();
+        while !next.is_null() {
+            if (*next).s_type == vk::StructureType::PHYSICAL_DEVICE_VULKAN_1_3_FEATURES {
+                change(&mut *next.cast());
             }
+            next = (*next).p_next.cast();
         }
     }
 }
@@ -101,13 +92,9 @@ module! {
         physical: vk::PhysicalDevice, count: *mut u32, out: *mut vk::QueueFamilyProperties
     ) {
         let change = state().claims.family;
-        // SAFETY: the caller keeps the contract of this very function, which writes `count` structs if there is room
-        // for them.
-        unsafe {
-            real(physical, count, out);
-            if !out.is_null() {
-                std::slice::from_raw_parts_mut(out, *count as usize).iter_mut().for_each(change);
-            }
+        real(physical, count, out);
+        if !out.is_null() {
+            std::slice::from_raw_parts_mut(out, *count as usize).iter_mut().for_each(change);
         }
     }
 }
@@ -117,20 +104,17 @@ module! {
         physical: vk::PhysicalDevice, out: *mut vk::PhysicalDeviceMemoryProperties
     ) {
         let Claims { splits_memory: splits, heap_bytes, .. } = state().claims;
-        // SAFETY: the caller keeps the contract of this very function, which writes the struct.
-        unsafe {
-            real(physical, out);
-            if let Some(bytes) = heap_bytes {
-                (*out).memory_heaps.iter_mut().for_each(|heap| heap.size = heap.size.min(bytes));
-            }
-            if splits {
-                use vk::MemoryPropertyFlags as Flags;
-                assert_eq!((*out).memory_type_count, 1, "memory can be split where there is one type of it");
-                (*out).memory_type_count = 2;
-                (*out).memory_types[OF_DEVICE as usize].property_flags = Flags::DEVICE_LOCAL;
-                (*out).memory_types[OF_HOST as usize] =
-                    vk::MemoryType { property_flags: Flags::HOST_VISIBLE | Flags::HOST_COHERENT, heap_index: 0 };
-            }
+        real(physical, out);
+        if let Some(bytes) = heap_bytes {
+            (*out).memory_heaps.iter_mut().for_each(|heap| heap.size = heap.size.min(bytes));
+        }
+        if splits {
+            use vk::MemoryPropertyFlags as Flags;
+            assert_eq!((*out).memory_type_count, 1, "memory can be split where there is one type of it");
+            (*out).memory_type_count = 2;
+            (*out).memory_types[OF_DEVICE as usize].property_flags = Flags::DEVICE_LOCAL;
+            (*out).memory_types[OF_HOST as usize] =
+                vk::MemoryType { property_flags: Flags::HOST_VISIBLE | Flags::HOST_COHERENT, heap_index: 0 };
         }
     }
 }
@@ -140,12 +124,9 @@ macro_rules! requirements {
         module! {
             $name: $pfn(device: vk::Device, object: vk::$object, out: *mut vk::MemoryRequirements) {
                 let splits = state().claims.splits_memory;
-                // SAFETY: the caller keeps the contract of this very function, which writes the struct.
-                unsafe {
-                    real(device, object, out);
-                    if splits {
-                        (*out).memory_type_bits = 1 << OF_DEVICE | 1 << OF_HOST;
-                    }
+                real(device, object, out);
+                if splits {
+                    (*out).memory_type_bits = 1 << OF_DEVICE | 1 << OF_HOST;
                 }
             }
         }

@@ -12,83 +12,62 @@ type Allocator<'a> = vk::AllocationCallbacks<'a>;
 
 module! {
     vkGetDeviceProcAddr: PFN_vkGetDeviceProcAddr(device: vk::Device, name: *const c_char) -> Option<Function> {
-        // SAFETY: the caller keeps the contract of this very function.
-        unsafe { device_address(device, name) }
+        device_address(device, name)
     }
 }
 
 module! {
     vkEnumerateInstanceExtensionProperties: PFN_vkEnumerateInstanceExtensionProperties(
         layer: *const c_char, count: *mut u32, out: *mut vk::ExtensionProperties
-    ) -> vk::Result {
-        if let Some(error) = fault("vkEnumerateInstanceExtensionProperties", MEMORY) {
-            return error;
-        }
+    ) -> vk::Result [MEMORY] {
         let has = state().claims.extension;
-        // SAFETY: the caller keeps the contract of this very function.
-        unsafe {
-            let result = real(layer, count, out);
-            if result == vk::Result::SUCCESS && !out.is_null() {
-                for one in std::slice::from_raw_parts_mut(out, *count as usize) {
-                    if one.extension_name_as_c_str().is_ok_and(|name| !has(name)) {
-                        one.extension_name = [0; 256];
-                    }
+        let result = real(layer, count, out);
+        if result == vk::Result::SUCCESS && !out.is_null() {
+            for one in std::slice::from_raw_parts_mut(out, *count as usize) {
+                if one.extension_name_as_c_str().is_ok_and(|name| !has(name)) {
+                    one.extension_name = [0; 256];
                 }
             }
-            result
         }
+        result
     }
 }
 
 module! {
     vkSetDebugUtilsObjectNameEXT: PFN_vkSetDebugUtilsObjectNameEXT(
         device: vk::Device, info: *const vk::DebugUtilsObjectNameInfoEXT<'_>
-    ) -> vk::Result {
-        if let Some(error) = fault("vkSetDebugUtilsObjectNameEXT", MEMORY) {
-            return error;
+    ) -> vk::Result [MEMORY] {
+        if (*info).object_type == vk::ObjectType::DESCRIPTOR_SET {
+            state().heard.wrong.push("a descriptor set was named, which lavapipe of Mesa 22.3 never frees".into());
         }
-        // SAFETY: the caller keeps the contract of this very function.
-        unsafe {
-            if (*info).object_type == vk::ObjectType::DESCRIPTOR_SET {
-                state().heard.wrong.push("a descriptor set was named, which lavapipe of Mesa 22.3 never frees".into());
-            }
-            real(device, info)
-        }
+        real(device, info)
     }
 }
 
 module! {
     vkCreateInstance: PFN_vkCreateInstance(
         info: *const vk::InstanceCreateInfo<'_>, allocator: *const Allocator<'_>, out: *mut vk::Instance
-    ) -> vk::Result {
-        if let Some(error) = fault("vkCreateInstance", MEMORY) {
-            return error;
+    ) -> vk::Result [MEMORY] {
+        let result = real(info, allocator, out);
+        if result == vk::Result::SUCCESS {
+            born(*out);
+            state().instance = *out;
         }
-        // SAFETY: the caller keeps the contract of this very function, which writes the handle where it succeeds.
-        unsafe {
-            let result = real(info, allocator, out);
-            if result == vk::Result::SUCCESS {
-                born(*out);
-                state().instance = *out;
-            }
-            result
-        }
+        result
     }
 }
 
 module! {
     vkDestroyInstance: PFN_vkDestroyInstance(instance: vk::Instance, allocator: *const Allocator<'_>) {
         dies(instance);
-        // SAFETY: the caller keeps the contract of this very function.
-        unsafe { real(instance, allocator) }
+        real(instance, allocator);
     }
 }
 
 module! {
     vkDestroyDevice: PFN_vkDestroyDevice(device: vk::Device, allocator: *const Allocator<'_>) {
         dies(device);
-        // SAFETY: the caller keeps the contract of this very function.
-        unsafe { real(device, allocator) }
+        real(device, allocator);
     }
 }
 
@@ -96,26 +75,21 @@ module! {
     vkAllocateMemory: PFN_vkAllocateMemory(
         device: vk::Device, info: *const vk::MemoryAllocateInfo<'_>, allocator: *const Allocator<'_>,
         out: *mut vk::DeviceMemory
-    ) -> vk::Result {
-        if let Some(error) = fault("vkAllocateMemory", MEMORY) {
-            return error;
-        }
+    ) -> vk::Result [MEMORY] {
         let splits = state().claims.splits_memory;
-        // SAFETY: the caller keeps the contract of this very function; both claimed types are the driver's only one.
-        unsafe {
-            let mut own = *info;
-            if splits {
-                own.memory_type_index = 0;
-            }
-            let result = real(device, &raw const own, allocator, out);
-            if result == vk::Result::SUCCESS {
-                born(*out);
-                if splits && (*info).memory_type_index == OF_DEVICE {
-                    state().census.hide(*out);
-                }
-            }
-            result
+        let mut own = *info;
+        if splits {
+            // Both claimed types are the driver's only one.
+            own.memory_type_index = 0;
         }
+        let result = real(device, &raw const own, allocator, out);
+        if result == vk::Result::SUCCESS {
+            born(*out);
+            if splits && (*info).memory_type_index == OF_DEVICE {
+                state().census.hide(*out);
+            }
+        }
+        result
     }
 }
 
@@ -123,17 +97,13 @@ module! {
     vkMapMemory: PFN_vkMapMemory(
         device: vk::Device, memory: vk::DeviceMemory, offset: vk::DeviceSize, size: vk::DeviceSize,
         flags: vk::MemoryMapFlags, data: *mut *mut c_void
-    ) -> vk::Result {
-        if let Some(error) = fault("vkMapMemory", MEMORY) {
-            return error;
-        }
+    ) -> vk::Result [MEMORY] {
         let mut state = state();
         if state.census.is_hidden(memory) {
             state.heard.wrong.push("memory was mapped that the host cannot see".into());
         }
         drop(state);
-        // SAFETY: the caller keeps the contract of this very function.
-        unsafe { real(device, memory, offset, size, flags, data) }
+        real(device, memory, offset, size, flags, data)
     }
 }
 
@@ -145,17 +115,14 @@ macro_rules! pipelines {
                 allocator: *const Allocator<'_>, out: *mut vk::Pipeline
             ) -> vk::Result {
                 if let Some(error) = fault(stringify!($name), MEMORY) {
-                    // SAFETY: the caller has room for `count` handles, which are null where creation fails.
-                    unsafe { std::slice::from_raw_parts_mut(out, count as usize) }.fill(vk::Pipeline::null());
+                    // The caller has room for `count` handles, which are null where creation fails.
+                    std::slice::from_raw_parts_mut(out, count as usize).fill(vk::Pipeline::null());
                     return error;
                 }
-                // SAFETY: the caller keeps the contract of this very function, which writes all handles.
-                unsafe {
-                    let result = real(device, cache, count, infos, allocator, out);
-                    let made = std::slice::from_raw_parts(out, count as usize);
-                    made.iter().filter(|pipeline| !pipeline.is_null()).for_each(|pipeline| born(*pipeline));
-                    result
-                }
+                let result = real(device, cache, count, infos, allocator, out);
+                let made = std::slice::from_raw_parts(out, count as usize);
+                made.iter().filter(|pipeline| !pipeline.is_null()).for_each(|pipeline| born(*pipeline));
+                result
             }
         }
     };

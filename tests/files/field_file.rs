@@ -1,13 +1,12 @@
 //! Field files: what was written comes back, and nothing else is ever taken for a field.
 
-use crate::common::{generate, names};
+use crate::common::generate;
 use fastrand::Rng;
 use serde::Serialize;
 use shadow_fields::field::file::{self, FIELD_MAGIC, SURFACES_MAGIC};
 use shadow_fields::field::{FieldHeader, FieldKind, Lattice, ShadowField, Storage};
 use shadow_fields::{Error, bake};
 use std::path::Path;
-use std::sync::atomic::{AtomicBool, Ordering};
 
 /// Offsets of the prologue, as the module's table states them.
 const VERSION_AT: usize = 8;
@@ -60,24 +59,6 @@ fn round_trip() {
         written.header.mesh = "na\"me \u{e9}\n".into();
         written.write(&path).unwrap();
         assert_eq!(ShadowField::read(&path).unwrap(), written);
-    }
-}
-
-#[test]
-fn stored_numbers_have_their_format() {
-    for storage in [Storage::F16, Storage::F32] {
-        let header = header(FieldKind::Radiance, storage, "cube:2x1");
-        let count = header.payload_bytes() as usize / storage.bytes();
-        let payload = (0..count)
-            .flat_map(|i| match storage {
-                Storage::F16 => half::f16::from_f32(i as f32 / 8.0).to_le_bytes().to_vec(),
-                Storage::F32 => (i as f32 / 8.0).to_le_bytes().to_vec(),
-            })
-            .collect();
-        let field = ShadowField { header, payload };
-        // Two bands: four coefficients a channel, three channels a sample; all values are exact in f16.
-        assert_eq!(field.stored(0, 0, 3), 3.0 / 8.0);
-        assert_eq!(field.stored(1, 2, 1), (12.0 + 8.0 + 1.0) / 8.0);
     }
 }
 
@@ -194,67 +175,4 @@ fn headers_are_not_believed() {
 fn headers_are_what_they_were() {
     let text = r#"{"shells":20,"inner":0.0,"outer":8.0,"cells":7,"fit":null,"edges":null}"#;
     assert_eq!(serde_json::to_string(&Lattice::default()).unwrap(), text);
-}
-
-#[test]
-fn missing_files_and_folders_are_bad_input() {
-    let folder = tempfile::tempdir().unwrap();
-    assert!(refusal(&folder.path().join("absent.sf")).contains("cannot be read"));
-    let a_folder = folder.path().join("folder.sf");
-    std::fs::create_dir(&a_folder).unwrap();
-    refusal(&a_folder);
-}
-
-#[test]
-fn nothing_is_left_half_written() {
-    let folder = tempfile::tempdir().unwrap();
-    let bad = |path: &Path| {
-        let error = small().write(path).expect_err("the target cannot be written");
-        assert!(error.exit_code() == 4 && error.to_string().contains("cannot be written"), "{error}");
-        assert!(error.to_string().contains(path.file_name().unwrap().to_str().unwrap()), "{error}");
-    };
-    // A file stands where a folder is needed.
-    std::fs::write(folder.path().join("file"), b"mine").unwrap();
-    bad(&folder.path().join("file/field.sf"));
-    assert_eq!(std::fs::read(folder.path().join("file")).unwrap(), b"mine");
-    // A folder stands where the file is to go: the temporary file was written, and has to go again.
-    std::fs::create_dir_all(folder.path().join("taken.sf/full")).unwrap();
-    bad(&folder.path().join("taken.sf"));
-    assert_eq!(names(folder.path()), ["file", "taken.sf"]);
-    // The folder vanished since: it is made again.
-    let below = folder.path().join("gone");
-    std::fs::create_dir(&below).unwrap();
-    std::fs::remove_dir(&below).unwrap();
-    small().write(&below.join("field.sf")).unwrap();
-    assert_eq!(names(&below), ["field.sf"]);
-}
-
-#[test]
-fn two_writers_and_a_reader_never_meet() {
-    let folder = tempfile::tempdir().unwrap();
-    let path = folder.path().join("shared.sf");
-    let fields = [1, 2].map(|seed| field(FieldKind::Radiance, Storage::F32, "cube:4x5,inner=1.02", seed));
-    fields[0].write(&path).unwrap();
-    let done = AtomicBool::new(false);
-    let reads = std::thread::scope(|scope| {
-        let reader = scope.spawn(|| {
-            let mut seen = [0, 0];
-            while !done.load(Ordering::Relaxed) || seen[0] + seen[1] == 0 {
-                let found = ShadowField::read(&path).unwrap();
-                let which = fields.iter().position(|f| *f == found).expect("one of the two, whole");
-                seen[which] += 1;
-            }
-            seen
-        });
-        let writers = [&fields[0], &fields[1]].map(|field| {
-            let path = &path;
-            scope.spawn(move || (0..200).for_each(|_| field.write(path).unwrap()))
-        });
-        writers.into_iter().for_each(|w| w.join().unwrap());
-        done.store(true, Ordering::Relaxed);
-        reader.join().unwrap()
-    });
-    assert!(reads[0] + reads[1] > 0);
-    assert!(fields.contains(&ShadowField::read(&path).unwrap()));
-    assert_eq!(names(folder.path()), ["shared.sf"], "no temporary file is left");
 }

@@ -139,23 +139,7 @@ fn bounding_sphere_is_smallest() {
 }
 
 #[test]
-fn bounding_spheres_of_generators() {
-    for (mesh, radius) in [
-        (sphere(0.37, 4), 0.37),
-        (torus(0.5, 0.2, 48, 24), 0.7),
-        (cuboid(Vec3::new(1.0, 2.0, 2.0), 3), 1.5),
-        (plane(2.0, 5), 2f64.sqrt()),
-    ] {
-        let (centre, r) = mesh.bounding_sphere();
-        assert_eq!(centre, Vec3::ZERO, "{}", mesh.name);
-        close(f64::from(r), radius, 3e-7);
-        assert!(
-            mesh.positions
-                .iter()
-                .all(|p| p.distance(centre) <= r && p.as_dvec3().distance(centre.as_dvec3()) <= f64::from(r))
-        );
-    }
-    // Moved far away, rounded, still all inside.
+fn a_ball_far_away_has_its_bounding_sphere() {
     let moved: Vec<Vec3> = sphere(0.37, 4).positions.iter().map(|p| *p + Vec3::new(1000.0, -20.0, 3.0)).collect();
     let (centre, r) = enclose::bounding_sphere(&moved);
     assert!(centre.distance(Vec3::new(1000.0, -20.0, 3.0)) < 1e-4 && (r - 0.37).abs() < 1e-4);

@@ -1,16 +1,12 @@
-//! What a bake leaves out: faces and backs, samples inside solids, and equal meshes.
+//! What a bake leaves out: samples that faces of the lattice share, and equal meshes.
 
 use crate::common::{generate, gpu, parse};
-use glam::DVec3;
 use shadow_fields::asset::Mesh;
 use shadow_fields::bake::cache::Cache;
-use shadow_fields::bake::triangles::unit_positions;
-use shadow_fields::bake::{self, SceneNeeds, capture};
+use shadow_fields::bake::{self, SceneNeeds};
 use shadow_fields::field::{FieldHeader, FieldKind, Storage};
 use shadow_fields::scene::Scene;
 use shadow_fields::scene_buffers::SceneBuffers;
-use shadow_fields::sh::basis::Y00;
-use shadow_fields::sh::cube;
 
 fn header(mesh: &Mesh, lattice: &str) -> FieldHeader {
     let lattice = lattice.parse().unwrap();
@@ -59,36 +55,4 @@ fn what_faces_of_the_lattice_share_is_captured_once() {
     let (field, report) = gpu.baker().field(&mesh, header, &|_, _| ()).unwrap();
     let places = 6 * (nodes - 2).pow(2) + 12 * (nodes - 2) + 8;
     assert_eq!((field.header.captured_samples, report.samples), (2 * places, 2 * 6 * nodes.pow(2)));
-}
-
-/// Just off a solid's surface a lookup lies between samples outside and inside. Those inside are captured off the
-/// nearest surface, which leaves the lookup near what is seen there; where they stand they would see all dark, and
-/// darken it.
-#[test]
-fn samples_inside_a_solid_are_captured_off_its_surface() {
-    let Some(gpu) = gpu() else { return };
-    let mesh = generate::torus(1.0, 0.3, 48, 24);
-    let positions = unit_positions(&mesh);
-    let (field, found) = gpu.baker().field(&mesh, header(&mesh, "cube:12x7"), &|_, _| ()).unwrap();
-    assert!(found.filled > 100, "{} samples inside", found.filled);
-    let weights = cube::solid_angle(16);
-    let mut sum = 0.0;
-    for turn in 0..12 {
-        // Off the tube by a tenth of its radius, all round it.
-        let around = 0.5 * f64::from(turn);
-        let along = 2.1 * f64::from(turn);
-        let radius = 1.0 + 0.33 * around.cos();
-        let p = DVec3::new(radius * along.cos(), 0.33 * around.sin(), radius * along.sin()) / 1.3;
-        let mut seen = 0.0;
-        for face in 0..6 {
-            let covered = capture::twin(&positions, &mesh.triangles, p, face, 16);
-            let texels = covered.iter().enumerate().filter(|(_, covered)| **covered);
-            seen += texels.map(|(i, _)| weights[i]).sum::<f64>() * Y00;
-        }
-        let mut blocked = [0.0; 16];
-        field.lookup(p, 0, &mut blocked);
-        sum += (blocked[0] - seen).powi(2);
-    }
-    let off = (sum / 12.0).sqrt();
-    assert!(off < 0.1, "{off}");
 }

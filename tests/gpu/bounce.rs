@@ -2,7 +2,7 @@
 //! its inside, every other place receives the same.
 
 use super::common::{Gpu, generate, gpu, parse, relative_rms};
-use super::stage::small;
+use super::stage::{against_rays, small};
 use glam::Vec3;
 use shadow_fields::asset::Mesh;
 use shadow_fields::bounce::Bounces;
@@ -71,38 +71,6 @@ fn all_of_a_hollow_sphere_is_lit_by_its_mean() {
     }
 }
 
-/// What moves within the sphere is lit by the mean of its inside, which rests.
-#[test]
-fn what_moves_is_lit_by_what_rests() {
-    let Some(gpu) = gpu() else { return };
-    let moving = Motion::Spin { axis: Vec3::Y, period_s: 9.0 };
-    let scene = Scene::builder()
-        .mesh("inside", inside(generate::sphere(1.0, 4)))
-        .mesh("lamp", generate::sphere(0.05, 2))
-        .mesh("ball", generate::sphere(0.1, 2))
-        .entity(EntityData { albedo: Vec3::splat(ALBEDO).into(), ..EntityData::of_mesh("inside") })
-        .entity(EntityData { position: Vec3::new(0.0, 0.1, 0.0), ..lamp() })
-        .entity(EntityData { position: Vec3::new(0.4, -0.3, 0.2), motion: vec![moving], ..EntityData::of_mesh("ball") })
-        .build()
-        .unwrap();
-    let areas = scene.meshes[0].vertex_areas_m2();
-    let frame = |bounces| {
-        let mut frame = gpu.frame(&scene, frame::Options { bounces, lights: Lights::Sharp, ..small() });
-        gpu.light(&mut frame, &scene.at(0.0))
-    };
-    let direct = frame(Bounces::None);
-    let all = frame(Bounces::All);
-    let whole: f64 = areas.iter().sum();
-    for channel in 0..3 {
-        let mean = all[0].iter().zip(&areas).map(|(c, area)| f64::from(c[channel]) * area).sum::<f64>() / whole;
-        for (v, (all, direct)) in all[2].iter().zip(&direct[2]).enumerate() {
-            let bounced = f64::from(all[channel] - direct[channel]);
-            // Walls are brighter near the lamp, and runs of 64 vertices are seen as flat pieces.
-            assert!((bounced / (0.7 * mean) - 1.0).abs() < 0.25, "{v}: {bounced}, not {}", 0.7 * mean);
-        }
-    }
-}
-
 /// Three things that move over a floor, under a sky: a ball, a tall box and a ring, nearly touching it.
 const THINGS: &str = r#"
 camera = { eye = [0.5, 1.8, 3.2], target = [0, 0.3, 0] }
@@ -145,11 +113,7 @@ fn what_moves_and_what_rests_light_each_other() {
     let vertices: Vec<Vertex> = vertices.into_iter().filter(is_above).collect();
     for (bounces, found, most) in [(1, &one, 0.075), (64, &all, 0.09)] {
         let rays = RayCast { rays: 512, bounces, ..RayCast::default() }.run(&world, &vertices);
-        let error = |found: &[Vec<[f32; 3]>]| {
-            let found = vertices.iter().flat_map(|v| found[v.entity][v.index]).map(f64::from);
-            relative_rms(found.zip(rays.iter().flat_map(|truth| truth.radiosity)))
-        };
-        let [without, with] = [error(&direct), error(found)];
+        let [without, with] = [&direct, found].map(|light| against_rays(light, &vertices, &rays));
         assert!(with < most && without > 2.4 * with, "{bounces}: {with}, {without} without");
     }
 }

@@ -86,12 +86,6 @@ fn nearer_hides_farther() {
     let Some(gpu) = gpu() else { return };
     let scene = balls("", &[RED, BLUE]);
     let centre = WIDTH / 2 + HEIGHT / 2 * WIDTH;
-    for (places, front) in [([[0.0, 0.0, 1.0], [0.0, 0.0, -1.0]], RED), ([[0.0, 0.0, -1.0], [0.0, 0.0, 1.0]], BLUE)] {
-        let picture = draw(&gpu, &scene, &places, Antialias::Samples, 1.0);
-        assert_eq!(picture[centre], front, "places {places:?}");
-        let back = if front == RED { 2 } else { 0 };
-        assert_eq!(middle(&picture, back)[2].max(0.0), 0.0, "the nearer ball covers the farther one");
-    }
     // Large balls 300 m away, 1 cm one behind the other: reversed depth in f32 tells them apart.
     let mut frame = gpu.frame(&scene, options(Antialias::Samples));
     let far = |z| Placement { scale: 40.0, ..at(0.0, 0.0, z) };
@@ -109,11 +103,14 @@ fn nearer_hides_farther() {
 #[test]
 fn nothing_in_view_is_a_picture_too() {
     let Some(gpu) = gpu() else { return };
-    let scene = balls("environment = { uniform = [0.25, 0.5, 0.75] }", &[RED, BLUE]);
+    let sky = "environment = { uniform = [0.1, 0.2, 0.3], gradient = { radiance = [1, 0.5, 0] } }";
+    // The gradient's mean is base .2 + rise .8 / 4, and half floats have 11 bits.
+    let is_mean = |(found, mean): (&f32, &f32)| (found - mean).abs() < 1e-3;
+    let is_background = |picture: &[f32]| picture.iter().zip([0.5, 0.4, 0.3].iter().cycle()).all(is_mean);
+    let scene = balls(sky, &[RED, BLUE]);
     let (seen, unseen) = ([at(-0.5, 0.0, 0.0), at(0.5, 0.2, 0.0)], [at(0.0, 0.0, 9.0), at(0.0, 1.0, 9.0)]);
     for antialias in [Antialias::None, Antialias::Samples, Antialias::Outlines] {
         let mut frame = gpu.frame(&scene, options(antialias));
-        let is_background = |picture: &[f32]| picture.chunks_exact(3).all(|p| *p == [0.25, 0.5, 0.75]);
         frame.render(&unseen, Some(1.0)).unwrap();
         assert!(is_background(&frame.picture()), "{antialias:?}: nothing in the first picture");
         frame.render(&seen, Some(1.0)).unwrap();
@@ -146,36 +143,6 @@ fn batches_change_nothing() {
     }
 }
 
-#[test]
-fn background_is_the_mean_of_the_sky() {
-    let Some(gpu) = gpu() else { return };
-    // The gradient's mean: base .2 + rise .8 / 4.
-    let sky = "environment = { uniform = [0.1, 0.2, 0.3], gradient = { radiance = [1, 0.5, 0] } }";
-    let picture = draw(&gpu, &balls(sky, &[RED]), &[[0.0, 0.0, 0.0]], Antialias::Samples, 1.0);
-    for corner in [0, WIDTH - 1, WIDTH * (HEIGHT - 1), WIDTH * HEIGHT - 1] {
-        for (found, expected) in picture[corner].iter().zip([0.5, 0.4, 0.3]) {
-            // Half floats: 11 bits.
-            assert!((found - expected).abs() < 1e-3, "{:?}", picture[corner]);
-        }
-    }
-}
-
-#[test]
-fn edges_are_smooth_with_samples_only() {
-    let Some(gpu) = gpu() else { return };
-    let scene = balls("", &[[1.0, 1.0, 1.0]]);
-    let between = |antialias| {
-        let picture = draw(&gpu, &scene, &[[0.0, 0.0, 0.0]], antialias, 1.0);
-        // Rounded: interpolated vertex attributes and half floats are off by 5e-4.
-        let mut levels: Vec<i32> = picture.iter().map(|p| (400.0 * p[0]).round() as i32).collect();
-        levels.sort_unstable();
-        levels.dedup();
-        levels
-    };
-    assert_eq!(between(Antialias::None), [0, 400]);
-    assert_eq!(between(Antialias::Samples), [0, 100, 200, 300, 400], "quarters, from four samples a pixel");
-}
-
 /// A ball before another, a box with creases and a floor that ends in sight, judged by 64 samples a pixel.
 #[test]
 fn outlines_are_smoother_than_four_samples() {
@@ -206,7 +173,8 @@ fn outlines_are_smoother_than_four_samples() {
         let found = frame.picture().into_iter().map(f64::from);
         relative_rms(found.zip(wanted.iter().flat_map(|texel| texel.color.to_array())))
     });
-    assert!(outlines < 0.4 * none && outlines < samples, "none {none}, samples {samples}, outlines {outlines}");
+    let are_smooth = samples < 0.6 * none && outlines < 0.4 * none && outlines < samples;
+    assert!(are_smooth, "none {none}, samples {samples}, outlines {outlines}");
 }
 
 /// Slivers at every angle, 0.02 to 1 pixel wide: with four samples a pixel none is brighter than its brightest vertex,
@@ -261,39 +229,6 @@ fn hidden_outlines_leave_no_trace() {
     let picture = |place| draw(&gpu, &scene, &[[0.0, 0.0, 1.0], place], Antialias::Outlines, 1.0);
     assert!(picture([0.0, 0.0, -1.0]) == picture([0.0, 0.0, 9.0]), "behind the first and behind the camera");
     assert!(picture([0.5, 0.0, -1.0]) != picture([0.0, 0.0, 9.0]), "beside it, it is seen");
-}
-
-#[test]
-fn white_keeps_hue() {
-    let Some(gpu) = gpu() else { return };
-    let scene = balls("", &[[8.0, 4.0, 2.0], [0.25, 0.5, 0.125]]);
-    let places = [[-1.0, 0.0, 0.0], [1.0, 0.0, 0.0]];
-    let centre = |picture: &Picture, x: f32| picture[(48.0 + 17.58 * x) as usize + HEIGHT / 2 * WIDTH];
-    for (white, bright) in [(1.0, [1.0, 0.5, 0.25]), (4.0, [4.0, 2.0, 1.0]), (f32::INFINITY, [8.0, 4.0, 2.0])] {
-        let picture = draw(&gpu, &scene, &places, Antialias::Samples, white);
-        for (x, expected) in [(-1.0, bright), (1.0, [0.25, 0.5, 0.125])] {
-            let found = centre(&picture, x);
-            // Two half-float steps.
-            let near = found.iter().zip(expected).all(|(f, e)| (f - e).abs() <= 2e-3 * e);
-            assert!(near, "white {white}: {found:?} for {expected:?}");
-        }
-    }
-}
-
-/// Drawn radiance is emission plus radiosity: a floor under a white sky is as bright as its albedo.
-#[test]
-fn lit_surfaces_have_their_radiosity() {
-    let Some(gpu) = gpu() else { return };
-    let text = "environment = { uniform = [1, 1, 1] }\n[[mesh]]\nname = \"wall\"\nplane = { size_m = 9, cells = 3 }\n\
-        [[entity]]\nmesh = \"wall\"\nalbedo = [0.25, 0.5, 0.75]\nemission = [0.5, 0, 0]\nemits = false\n\
-        rotation = { axis = [1, 0, 0], angle_deg = 90 }\n";
-    let scene = scene(text);
-    let mut frame = gpu.frame(&scene, options(Antialias::Samples));
-    frame.render(&scene.at(0.0), Some(f32::INFINITY)).unwrap();
-    let picture = frame.picture();
-    for (found, expected) in picture.chunks_exact(3).flatten().zip([0.75_f32, 0.5, 0.75].iter().cycle()) {
-        assert!((found - expected).abs() < 1e-3, "{found} for {expected}");
-    }
 }
 
 /// A quad of two triangles with the whole of a texture on it.
@@ -381,11 +316,8 @@ fn textures_are_even_under_four_samples() {
         .mesh("floor", mesh)
         .entity(EntityData { albedo: Albedo::Texture("checks".into()), ..EntityData::of_mesh("floor") });
     let scene = scene.build().unwrap();
-    let [one, four] = [Antialias::None, Antialias::Samples].map(|antialias| {
-        let mut frame = gpu.frame(&scene, options(antialias));
-        frame.render(&scene.at(0.0), Some(f32::INFINITY)).unwrap();
-        frame.picture()
-    });
+    let [one, four] =
+        [Antialias::None, Antialias::Samples].map(|antialias| gpu.picture(&scene, options(antialias), f32::INFINITY));
     let mut compared = 0;
     for (one, four) in one.chunks_exact(3).zip(four.chunks_exact(3)) {
         // The sky is blue too; a pixel of an edge has some of it.

@@ -42,17 +42,3 @@ fn at_most_two_are_under_way_and_owners_wait_for_them() {
     assert_eq!(device.flight_count(), 0);
     assert!(kept.download::<u32>(BYTES as usize / 4).unwrap().iter().all(|v| *v == 7));
 }
-
-#[test]
-fn a_flight_is_checked_by_the_tracker_like_any_recording() {
-    let Some(gpu) = gpu() else { return };
-    let a = Buffer::new(&gpu.device, "a", BufferKind::Device, 64).unwrap();
-    let b = Buffer::new(&gpu.device, "b", BufferKind::Device, 64).unwrap();
-    let mut commands = Commands::new(&gpu.device, "flight").unwrap();
-    commands.copy_range(&a, 0..a.size_bytes, &b, 0);
-    commands.copy_range(&b, 0..b.size_bytes, &a, 0);
-    let error = commands.launch().err().expect("no barrier stands between the copies").to_string();
-    assert!(error.contains("no barrier"), "{error}");
-    assert!(!gpu.device.take_validation_messages().is_empty(), "the layer hears two copies too");
-    assert_eq!(gpu.device.flight_count(), 0);
-}

@@ -35,12 +35,6 @@ fn ball(gloss: &str, more: &str) -> Scene {
     ))
 }
 
-fn picture(gpu: &Gpu, scene: &Scene, options: frame::Options) -> Vec<f32> {
-    let mut frame = gpu.frame(scene, options);
-    frame.render(&scene.at(0.0), Some(f32::INFINITY)).unwrap();
-    frame.picture()
-}
-
 fn by_rays(scene: &Scene, rays: u32) -> RayPicture {
     by_bouncing_rays(scene, rays, 0)
 }
@@ -55,7 +49,7 @@ fn by_bouncing_rays(scene: &Scene, rays: u32, bounces: u32) -> RayPicture {
 /// Pictures with one bounce: the frame's, and that of rays.
 fn bounced_once(gpu: &Gpu, scene: &Scene) -> [Vec<f32>; 2] {
     let bake = bake::Options { groups: true, ..bake::Options::default() };
-    let found = picture(gpu, scene, frame::Options { bounces: Bounces::One, bake, ..options() });
+    let found = gpu.picture(scene, frame::Options { bounces: Bounces::One, bake, ..options() }, f32::INFINITY);
     [found, by_bouncing_rays(scene, 256, 1).linear]
 }
 
@@ -77,10 +71,10 @@ fn a_white_metal_vanishes_in_a_furnace() {
     let Some(gpu) = gpu() else { return };
     for roughness in [0.0, 0.2, 0.5, 0.8, 1.0] {
         let scene = ball(&format!("roughness = {roughness:.1}, metallic = 1"), "environment = { uniform = [1, 1, 1] }");
-        let found = picture(&gpu, &scene, options());
+        let found = gpu.picture(&scene, options(), f32::INFINITY);
         let worst = found.iter().map(|c| (c - 1.0).abs()).fold(0.0, f32::max);
         assert!(worst < 0.03, "{roughness}: {worst} off 1");
-        let single = picture(&gpu, &scene, frame::Options { single_scatter: true, ..options() });
+        let single = gpu.picture(&scene, frame::Options { single_scatter: true, ..options() }, f32::INFINITY);
         let middle = single[3 * (SIZE[0] * SIZE[1] / 2 + SIZE[0] / 2) as usize];
         // The pixel in the middle sees the ball at a cosine of 0.94 or more.
         let range = [0.93, 1.0].map(|z| lobe::energy(roughness, z) as f32);
@@ -98,7 +92,7 @@ fn a_white_dielectric_nearly_vanishes() {
     let Some(gpu) = gpu() else { return };
     for roughness in [0.1, 0.5, 1.0] {
         let scene = ball(&format!("roughness = {roughness:.1}"), "environment = { uniform = [1, 1, 1] }");
-        let found = picture(&gpu, &scene, options());
+        let found = gpu.picture(&scene, options(), f32::INFINITY);
         let mean = found.iter().map(|c| f64::from(*c)).sum::<f64>() / found.len() as f64;
         assert!((mean - 1.0).abs() < 0.02, "{roughness}: {mean}");
     }
@@ -128,7 +122,7 @@ fn highlights_are_those_of_rays() {
     for (name, light) in &lights {
         for (roughness, most) in [(0.2, 0.065), (0.3, 0.065), (0.5, 0.04), (0.7, 0.045), (1.0, 0.045)] {
             let scene = ball(&format!("roughness = {roughness:.1}, metallic = 1"), light);
-            let found = error(&picture(&gpu, &scene, options()), &by_rays(&scene, 256).linear);
+            let found = error(&gpu.picture(&scene, options(), f32::INFINITY), &by_rays(&scene, 256).linear);
             lines.push(format!("{name} {roughness}: {found:.4}"));
             assert!(found < most, "{lines:?}");
         }
@@ -146,7 +140,7 @@ fn reflections_past_others_are_those_of_rays() {
              [[mesh]]\nname = \"floor\"\nplane = { size_m = 6, cells = 12 }\n\
              [[entity]]\nmesh = \"floor\"\nposition = [0, -1, 0]\n";
         let scene = ball(&format!("roughness = {roughness:.1}, metallic = 1"), floor);
-        let found = error(&picture(&gpu, &scene, options()), &by_rays(&scene, 256).linear);
+        let found = error(&gpu.picture(&scene, options(), f32::INFINITY), &by_rays(&scene, 256).linear);
         lines.push(format!("{roughness}: {found:.4}"));
         assert!(found < most, "{lines:?}");
     }
@@ -263,8 +257,8 @@ fn a_diffuse_surface_stays_so() {
              [[entity]]\nmesh = \"ball\"\nposition = [-0.6, 0, 0]\n[[entity]]\nmesh = \"ball\"\nposition = [0.6, 0, 0]\n{gloss}\n"
         ))
     };
-    let plain = picture(&gpu, &two(""), options());
-    let beside = picture(&gpu, &two("gloss = { roughness = 0.5 }"), options());
+    let plain = gpu.picture(&two(""), options(), f32::INFINITY);
+    let beside = gpu.picture(&two("gloss = { roughness = 0.5 }"), options(), f32::INFINITY);
     let left = |pixels: &[f32]| -> Vec<f32> {
         pixels.chunks_exact(3 * SIZE[0] as usize).flat_map(|row| row[..row.len() / 2].to_vec()).collect()
     };

@@ -29,13 +29,12 @@ fn picture_error(gpu: &Gpu, scene: &Scene) -> f64 {
     let size = [96, 64];
     let bake = bake::Options { groups: true, vertices: 20_000, ..bake::Options::default() };
     let options = frame::Options { size, bake, bounces: Bounces::None, ..frame::Options::default() };
+    let found = gpu.picture(scene, options, f32::INFINITY);
     let placements = scene.at(0.0);
-    let mut frame = gpu.frame(scene, options);
-    frame.render(&placements, Some(f32::INFINITY)).unwrap();
     let world = World::of(scene, &placements);
     let rays = pixels::picture(&world, size, true, &RayCast { rays: 512, runs: 2, ..RayCast::default() }, &|_| ());
     // The lamp itself is brighter than all that it lights.
-    let pairs = frame.picture().into_iter().zip(rays.linear);
+    let pairs = found.into_iter().zip(rays.linear);
     relative_rms(pairs.filter(|(found, truth)| found.max(*truth) < 0.6))
 }
 
@@ -142,9 +141,8 @@ fn what_is_carried_together_shades_itself_as_at_rest() {
             .entity(EntityData { emission: Vec3::splat(10.0), ..at("bulb", [0.1, 0.85, 0.05]) });
         let bake = bake::Options { groups: true, vertices: 0, ..bake::Options::default() };
         let scene = scene.build().unwrap();
-        let mut frame = gpu.frame(&scene, frame::Options { size: [96, 64], bake, ..frame::Options::default() });
-        frame.render(&scene.at(0.0), Some(f32::INFINITY)).unwrap();
-        frame.picture()
+        let options = frame::Options { size: [96, 64], bake, ..frame::Options::default() };
+        gpu.picture(&scene, options, f32::INFINITY)
     };
     let pairs = picture(vec![Motion::Node(Box::new(node.clone()))]).into_iter().zip(picture(Vec::new()));
     let error = relative_rms(pairs);

@@ -200,38 +200,6 @@ fn size_does_not_matter() {
     assert!(worst < 1e-4, "{worst:e}");
 }
 
-/// A sphere that spins in place shades the same, but for its facets and the interpolation between samples.
-#[test]
-fn spinning_sphere_shows_the_interpolation_error() {
-    let Some(gpu) = gpu() else { return };
-    let floor = "[[mesh]]\nname = \"floor\"\nplane = { size_m = 8, cells = 24 }\n";
-    let text = format!("{WHITE_SKY}{floor}{BALL}{}{}", entity("floor", ""), entity("ball", "receives = false"));
-    let scene = scene(&text);
-    // The lattice and faces that the command line bakes by default, in f32.
-    let bake = bake::Options { storage: small().bake.storage, ..Default::default() };
-    let mut frame = gpu.frame(&scene, frame::Options { bake, ..small() });
-    let turned = |rotation| Placement { rotation, ..at(0.1, 1.1, -0.2) };
-    let mut spins = Vec::new();
-    for i in 0..12_u8 {
-        let axis = Vec3::new(f32::from(i).sin(), f32::from(i).cos(), 0.5).normalize();
-        let rotation = Quat::from_axis_angle(axis, 0.5 * f32::from(i));
-        spins.push(gpu.light(&mut frame, &[at(0.0, 0.0, 0.0), turned(rotation)]).swap_remove(0));
-    }
-    let mut worst = 0.0_f64;
-    let mut square = 0.0;
-    for v in 0..spins[0].len() {
-        let mean = spins.iter().map(|s| f64::from(s[v][0])).sum::<f64>() / spins.len() as f64;
-        for spin in &spins {
-            let error = f64::from(spin[v][0]) - mean;
-            worst = worst.max(error.abs());
-            square += error * error;
-        }
-    }
-    let rms = (square / (spins.len() * spins[0].len()) as f64).sqrt();
-    assert!(worst > 1e-7, "the samples are not turned at all");
-    assert!(rms < 1.5e-3 && worst < 2e-2, "{rms:e} RMS, {worst:e} at most");
-}
-
 /// The convention of the cosine: a vertex receives light from the side that its normal faces, and none from behind.
 #[test]
 fn light_comes_from_where_it_stands() {

@@ -87,23 +87,6 @@ sphere = { radius_m = 0.5, subdivisions = 2 }
 mesh = "floor"
 "#;
 
-/// Six lights around a ball.
-fn six_lights() -> Scene {
-    let mut text = format!("environment = {{ uniform = [0.1, 0.2, 0.3] }}\n{FLOOR_AND_BALL}");
-    text += "[[entity]]\nmesh = \"ball\"\nposition = [0.113, 0.817, 0.029]\n";
-    for i in 0..6 {
-        let (z, x) = (f64::from(i) * 1.1).sin_cos();
-        let emission = [8 * (i % 3), 3 + i, 9 - i];
-        text += &format!(
-            "[[entity]]\nmesh = \"ball\"\nscale = 0.3\nposition = [{}, {}, {}]\nemission = {emission:?}\n",
-            1.6 * x,
-            1.3 + 0.1 * f64::from(i),
-            1.6 * z
-        );
-    }
-    scene(&text)
-}
-
 #[test]
 fn emitters_that_occlude_and_receive() {
     let Some(gpu) = gpu() else { return };
@@ -235,10 +218,10 @@ fn chains_too_long_for_texel_views() {
 #[test]
 fn every_barrier_is_needed() {
     let Some(gpu) = gpu() else { return };
-    let scene = six_lights();
+    let scene = scene(MIXED);
     let mut frame = gpu.frame(&scene, small());
     let (rest, mut moved) = (scene.at(0.0), scene.at(0.0));
-    moved.iter_mut().for_each(|p| p.position.x += 0.3);
+    moved[1].position.x += 0.3;
     frame.render(&rest, Some(1.0)).unwrap();
     let light = frame.radiosity(0).unwrap();
     let picture = frame.picture();

@@ -4,10 +4,8 @@
 
 use crate::common::{Gpu, gpu};
 use crate::stage::{difference, scene, small};
-use glam::{DVec3, Vec3};
+use glam::Vec3;
 use shadow_fields::check::merge::{ARITHMETIC, against_twin};
-use shadow_fields::lists::gather::{EntityBounds, SceneBounds};
-use shadow_fields::lists::skip::Skip;
 use shadow_fields::scene::Scene;
 use std::collections::BTreeSet;
 
@@ -80,27 +78,4 @@ fn two_occluders_about_as_far_as_a_light() {
     // Products truncated to four bands do not quite commute.
     assert!(step < 2e-3 * brightest, "{step} of {brightest}");
     assert!(f64::from(step) > 2.0 * ARITHMETIC * f64::from(brightest), "the order can be told apart: {step:e}");
-}
-
-/// The key is in f32: what differs by less comes as equal, and by index, for the merge, for its twin and for the exact
-/// chain alike.
-#[test]
-fn equal_keys_go_by_index() {
-    let entity = |x: f64| EntityBounds {
-        sharp: false,
-        centre: DVec3::new(x, 2.0, 3.0),
-        radius_m: 0.5,
-        reflectance: 0.7,
-        occludes: true,
-        emits: false,
-        coloured: false,
-        radiance: 0.0,
-        facing: None,
-        sheet: None,
-    };
-    let scene_bounds =
-        SceneBounds::new(vec![entity(0.0), entity(1.0 + 1e-12), entity(1.0), entity(1.0 - 1e-5)], None, Skip::ALL, 0.0);
-    let mut order = [1, 2, 3];
-    order.sort_by_key(|&j| scene_bounds.order(0, j));
-    assert_eq!(order, [3, 1, 2]);
 }

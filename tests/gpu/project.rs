@@ -1,44 +1,12 @@
-//! Projection on the device against its twin in f64, and what samples stand for.
+//! Projection of constant content, and what samples stand for.
 
 use crate::common::{generate, gpu};
 use glam::Vec3;
-use shadow_fields::asset::Mesh;
 use shadow_fields::bake::assemble::{Source, Sources, twin};
 use shadow_fields::bake::capture::NO_SLOT;
-use shadow_fields::check::project::{self, Content, EYES, F32};
+use shadow_fields::check::project::Content;
 use shadow_fields::field::{FieldKind, Lattice};
 use std::f64::consts::PI;
-
-fn painted_pot() -> Mesh {
-    let pot = generate::teapot(3);
-    let colors = pot.normals.iter().map(|n| (*n + Vec3::ONE) * Vec3::new(0.5, 1.0, 3.0)).collect();
-    Mesh::new("painted pot", pot.positions, pot.normals, Some(colors), pot.triangles).unwrap()
-}
-
-/// More bands, sizes of faces and constant content than `check` tries.
-#[test]
-fn projections_are_those_of_the_twin() {
-    let Some(gpu) = gpu() else { return };
-    let pot = generate::teapot(3);
-    let painted = painted_pot();
-    let closed = generate::cuboid(Vec3::ONE, 1);
-    let baker = gpu.baker();
-    for face_px in [8, 64] {
-        let black = Content::new(&baker, &pot, &EYES, (face_px, FieldKind::Occlusion, true)).unwrap();
-        // From inside a solid, unculled, every texel is black.
-        let inside = [Vec3::new(0.1, 0.05, -0.2)];
-        let constant = Content::new(&baker, &closed, &inside, (face_px, FieldKind::Occlusion, false)).unwrap();
-        let bright = Content::new(&baker, &painted, &EYES, (face_px, FieldKind::Radiance, true)).unwrap();
-        for bands in 2..=7 {
-            for content in [&black, &constant, &bright] {
-                let (error, largest) = project::compare(content, bands).unwrap();
-                let place =
-                    format!("{bands} bands, {:?}, {face_px} px: {error:e}, largest {largest}", content.capture.kind);
-                assert!(error <= F32 && largest > 0.01, "{place}");
-            }
-        }
-    }
-}
 
 /// Closed form: all blocked is sqrt(4 pi) in the constant band and nothing else; nothing blocked is nothing.
 #[test]

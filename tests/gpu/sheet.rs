@@ -1,7 +1,7 @@
 //! Sheets against rays: grounds, walls and ceilings that are rectangles, and what moves past them.
 
-use crate::common::{Gpu, gpu, relative_rms};
-use crate::stage::{scene, small};
+use crate::common::{Gpu, gpu};
+use crate::stage::{against_rays, scene, small};
 use shadow_fields::bake::{self, Quality};
 use shadow_fields::check::merge::ROOM;
 use shadow_fields::frame;
@@ -14,21 +14,14 @@ fn defaults(lights: Lights) -> frame::Options {
     frame::Options { bake, lights, ..small() }
 }
 
-/// Vertices of an entity as rays light them.
-fn truth(scene: &Scene, time_s: f64, entity: usize, every: usize, rays: u32) -> (Vec<usize>, Vec<f64>) {
-    let world = World::of(scene, &scene.at(time_s));
-    let count = scene.meshes[scene.entities[entity].mesh].positions.len();
-    let chosen: Vec<usize> = (0..count).step_by(every).collect();
-    let vertices: Vec<Vertex> = chosen.iter().map(|&index| Vertex { entity, index }).collect();
-    let estimates = RayCast { rays, runs: 1, ..Default::default() }.run(&world, &vertices);
-    (chosen, estimates.iter().map(|estimate| estimate.radiosity[0]).collect())
-}
-
 /// Relative RMS of an entity's light against rays.
 fn error(gpu: &Gpu, frame: &mut frame::Frame, scene: &Scene, time_s: f64, entity: usize, every: usize) -> f64 {
-    let light = gpu.light(frame, &scene.at(time_s)).swap_remove(entity);
-    let (chosen, truth) = truth(scene, time_s, entity, every, 1024);
-    relative_rms(chosen.iter().zip(truth).map(|(&v, truth)| (f64::from(light[v][0]), truth)))
+    let placements = scene.at(time_s);
+    let count = scene.meshes[scene.entities[entity].mesh].positions.len();
+    let vertices: Vec<Vertex> = (0..count).step_by(every).map(|index| Vertex { entity, index }).collect();
+    let cast = RayCast { rays: 1024, runs: 1, ..Default::default() };
+    let rays = cast.run(&World::of(scene, &placements), &vertices);
+    against_rays(&gpu.light(frame, &placements), &vertices, &rays)
 }
 
 /// Largest root mean square, over vertices, of a step that neither neighbour's slope explains.

@@ -6,7 +6,7 @@ use crate::self_visibility::light_rays;
 use glam::{DVec3, Vec3};
 use shadow_fields::asset::Mesh;
 use shadow_fields::bake::silhouette::{SilhouetteOptions, bake_silhouette};
-use shadow_fields::field::silhouette::{SilhouetteField, SilhouetteHeader, decode, encode};
+use shadow_fields::field::silhouette::{SilhouetteField, decode, encode};
 use shadow_fields::field::sub_light::SeenLight;
 use shadow_fields::truth::ray_mesh::RayMesh;
 
@@ -196,26 +196,6 @@ fn what_lies_behind_the_receiver_or_the_light_blocks_nothing() {
         before = now;
     }
     assert_eq!(before, 1.0);
-}
-
-#[test]
-fn a_file_keeps_everything_and_its_header_is_not_believed() {
-    let Some(gpu) = gpu() else { return };
-    let field = bake(&gpu, &generate::teapot(2), SilhouetteOptions { cells: 2, map_px: 8, view_px: 32, levels: false });
-    let folder = tempfile::tempdir().unwrap();
-    let path = folder.path().join("pot.sf");
-    field.write(&path).unwrap();
-    let read = SilhouetteField::read(&path).unwrap();
-    assert_eq!((&read.header, &read.payload), (&field.header, &field.payload));
-    assert_eq!(read.frames, field.frames);
-    let mut header = field.header.clone();
-    header.cells = 3;
-    assert!(SilhouetteField::new(header.clone(), field.payload.clone()).is_err(), "maps are missing");
-    header.cells = u32::MAX;
-    assert!(SilhouetteField::new(header, field.payload.clone()).is_err(), "cells are out of range");
-    // Twice as many are 2 within 32 bits.
-    let header = SilhouetteHeader { half_px: (1 << 31) + 1, ..field.header.clone() };
-    assert!(SilhouetteField::new(header, field.payload.clone()).is_err(), "halves are out of range");
 }
 
 /// What is stored lies as near as a byte can to the number.

@@ -85,21 +85,6 @@ fn what_moves_is_merged_again_to_the_same_bits() {
     }
 }
 
-/// A merge that did not run leaves nothing behind that a later one would take for done.
-#[test]
-fn a_refused_frame_is_done_again() {
-    let Some(gpu) = gpu() else { return };
-    let scene = town(3, 2.0, 1);
-    let mut frame = gpu.frame(&scene, small());
-    let placements = scene.at(0.0);
-    assert!(gpu.without_barrier(0, || frame.render(&placements, Some(1.0))).is_err());
-    gpu.device.take_validation_messages();
-    let passes = frame.render(&placements, Some(1.0)).unwrap();
-    assert!(passes.iter().any(|t| t.pass == "merge"), "{passes:?}");
-    let passes = frame.render(&placements, Some(1.0)).unwrap();
-    assert!(passes.iter().all(|t| t.pass != "merge"), "nothing has moved: {passes:?}");
-}
-
 /// Switches that say they change no number.
 #[test]
 fn exact_skips_change_nothing() {

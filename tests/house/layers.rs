@@ -54,7 +54,7 @@ fn is_word(c: char) -> bool {
     c.is_alphanumeric() || c == '_'
 }
 
-/// Names right behind `prefix`: one, or the first of each part of a braced list.
+/// Names right behind `prefix`.
 fn names_after(code: &str, prefix: &str) -> BTreeSet<String> {
     let mut names = BTreeSet::new();
     for (at, _) in code.match_indices(prefix) {
@@ -62,27 +62,8 @@ fn names_after(code: &str, prefix: &str) -> BTreeSet<String> {
             continue;
         }
         let rest = &code[at + prefix.len()..];
-        let first = |part: &str| part.trim().chars().take_while(|c| is_word(*c)).collect::<String>();
-        if let Some(list) = rest.strip_prefix('{') {
-            let mut depth = 0;
-            let mut part = String::new();
-            for c in list.chars() {
-                match c {
-                    '{' => depth += 1,
-                    '}' if depth == 0 => break,
-                    '}' => depth -= 1,
-                    ',' if depth == 0 => {
-                        names.insert(first(&std::mem::take(&mut part)));
-                        continue;
-                    }
-                    _ => {}
-                }
-                part.push(c);
-            }
-            names.insert(first(&part));
-        } else {
-            names.insert(first(rest));
-        }
+        assert!(!rest.starts_with('{'), "{prefix}{}: modules are used one a line", rest.lines().next().unwrap_or(""));
+        names.insert(rest.chars().take_while(|c| is_word(*c)).collect());
     }
     names.remove("");
     names

@@ -89,43 +89,6 @@ impl Stand {
     fn is_folded(&self, title: &str) -> bool {
         self.place(title).height() < 50.0
     }
-
-    /// Sizes of all texts that are seen, points.
-    fn texts(&mut self) -> Vec<(f32, String)> {
-        let shapes = self.turn(Vec::new());
-        let seen =
-            shapes.into_iter().filter(|clipped| clipped.clip_rect.intersects(clipped.shape.visual_bounding_rect()));
-        seen.flat_map(|clipped| sizes(&clipped.shape)).collect()
-    }
-}
-
-fn sizes(shape: &egui::Shape) -> Vec<(f32, String)> {
-    match shape {
-        egui::Shape::Vec(shapes) => shapes.iter().flat_map(sizes).collect(),
-        egui::Shape::Text(text) => {
-            let job = &text.galley.job;
-            job.sections.iter().map(|section| (section.format.font_id.size, job.text.clone())).collect()
-        }
-        _ => Vec::new(),
-    }
-}
-
-#[test]
-fn no_text_is_smaller_than_twelve_points() {
-    let mut stand = Stand::new([1280.0, 1100.0]);
-    for command in [Command::ToggleReference, Command::ToggleError, Command::ToggleKeys] {
-        stand.editor.apply(command);
-    }
-    stand.settle();
-    // The last line of the figures unfolds the details.
-    let figures = stand.place(FIGURES);
-    stand.click(pos2(figures.left() + 30.0, figures.bottom() - 16.0));
-    let sizes = stand.texts();
-    let parts = ["70 269", "turn the camera", "60/s", "ms", "too bright", "draw.frag", "exposure", "ray cast"];
-    for part in parts.into_iter().chain(["computing shadows: 33 %, 8 s left"]) {
-        assert!(sizes.iter().any(|(_, text)| text.contains(part)), "{part:?} is not shown: {sizes:?}");
-    }
-    assert!(sizes.iter().all(|(size, _)| *size >= 12.0), "{sizes:?}");
 }
 
 #[test]
@@ -164,18 +127,16 @@ fn a_click_anywhere_on_the_title_folds() {
     }
 }
 
-/// Sizes and texts are again as they were, whatever the window was in between.
+/// Everything is again as it was, whatever the window was in between.
 #[test]
 fn panels_grow_back_after_the_window_was_small() {
     for small in [[150.0, 100.0], [600.0, 300.0], [1200.0, 90.0]] {
         let mut stand = Stand::new([1280.0, 720.0]);
         stand.editor.apply(Command::ToggleKeys);
         stand.settle();
-        let state = |stand: &mut Stand| ([KEYS, FIGURES, "notes"].map(|title| stand.place(title)), stand.texts());
-        let before = state(&mut stand);
-        assert!(before.1.iter().any(|(_, text)| text.contains("sky turned")));
+        let before = stand.turn(Vec::new());
         stand.resize(small);
         stand.resize([1280.0, 720.0]);
-        assert_eq!(state(&mut stand), before, "{small:?}");
+        assert!(stand.turn(Vec::new()) == before, "{small:?}");
     }
 }

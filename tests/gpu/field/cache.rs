@@ -1,7 +1,7 @@
 //! Baked fields and transfers through the cache.
 
 use super::{quiet, small, torus};
-use crate::common::{generate, gpu, library, open};
+use crate::common::{generate, gpu, library};
 use glam::Vec3;
 use shadow_fields::asset::Mesh;
 use shadow_fields::bake::cache::Cache;
@@ -139,31 +139,4 @@ fn without_a_folder_a_bake_is_kept_in_memory() {
         assert_eq!([first.2, second.2], [[true; 2], [false; 2]], "another cache knows nothing of it");
         assert!(first.0 == second.0 && first.1 == second.1);
     }
-}
-
-/// As two processes would: each thread has its own instance and device, both the same cache folder.
-#[test]
-fn two_devices_bake_into_one_cache() {
-    let Some(_gpu) = gpu() else { return };
-    let folder = tempfile::tempdir().unwrap();
-    let mesh = torus();
-    let options = small("cube:6x3", Storage::F16, 4);
-    let outcomes = std::thread::scope(|scope| {
-        let threads = [0, 1].map(|_| {
-            scope.spawn(|| {
-                let device = open().unwrap();
-                let header = bake::header(&mesh, FieldKind::Occlusion, &options);
-                let (_, field) = cached(&device, folder.path(), &mesh, &header);
-                device.save_pipeline_cache();
-                (field, device.take_validation_messages())
-            })
-        });
-        threads.map(|thread| thread.join().unwrap())
-    });
-    assert!(outcomes[0] == outcomes[1], "the same header and bytes");
-    assert_eq!(outcomes[0].1, Vec::<String>::new());
-    let paths = files(folder.path(), "sf");
-    assert_eq!(paths.len(), 1);
-    assert!(ShadowField::read(&paths[0]).unwrap() == outcomes[0].0);
-    assert_eq!(std::fs::read_dir(folder.path().join("fields")).unwrap().count(), 1, "no temporary file is left");
 }

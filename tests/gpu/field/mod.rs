@@ -12,10 +12,11 @@ use shadow_fields::bake::project;
 use shadow_fields::bake::surface::{Surface, inside, pushed_out};
 use shadow_fields::bake::triangles::unit_positions;
 use shadow_fields::bake::{self, SceneNeeds, TRANSFER_OFFSET, capture};
-use shadow_fields::field::{FieldHeader, FieldKind, ShadowField, Storage};
+use shadow_fields::field::{FieldKind, ShadowField, Storage};
 use shadow_fields::scene_buffers::SceneBuffers;
 use shadow_fields::sh::lobe;
 use shadow_fields::sh::quadrature::random_direction;
+use std::cell::RefCell;
 
 fn quiet(_: u32, _: u32) {}
 
@@ -24,9 +25,15 @@ fn small(lattice: &str, storage: Storage, bands: usize) -> bake::Options {
     bake::Options { bands, storage, lattice: lattice.parse().unwrap(), face_px: 32, ..Default::default() }
 }
 
+/// A baked field, whose progress is told up to the end.
 fn bake_field(gpu: &Gpu, mesh: &Mesh, kind: FieldKind, options: &bake::Options) -> ShadowField {
-    let (field, report) = gpu.baker().field(mesh, bake::header(mesh, kind, options), &quiet).unwrap();
+    let told = RefCell::new(Vec::new());
+    let progress = |done, all| told.borrow_mut().push((done, all));
+    let (field, report) = gpu.baker().field(mesh, bake::header(mesh, kind, options), &progress).unwrap();
     let header = &field.header;
+    let told = told.into_inner();
+    assert_eq!(told.last(), Some(&(header.captured_samples, header.captured_samples)));
+    assert!(told.windows(2).all(|pair| pair[0].0 < pair[1].0), "{told:?}");
     assert_eq!(report.samples + report.filled, header.lattice.sample_count());
     for sample in 0..header.lattice.stored_count() {
         for number in 0..header.sample_stride() {
@@ -200,35 +207,6 @@ fn a_field_lands_at_its_place_in_a_scene() {
         ends.push(slot.bytes.clone());
     }
     assert!(ends[0].start == 0 && ends[0].end <= ends[1].start && ends[1].end <= buffers.fields.size_bytes);
-}
-
-#[test]
-fn progress_is_told_up_to_the_end() {
-    let Some(gpu) = gpu() else { return };
-    let mesh = generate::sphere(1.0, 1);
-    let options = small("cube:3x5", Storage::F16, 4);
-    let header = bake::header(&mesh, FieldKind::Occlusion, &options);
-    let told = std::cell::RefCell::new(Vec::new());
-    let progress = |done, all| told.borrow_mut().push((done, all));
-    let (field, _) = gpu.baker().field(&mesh, header, &progress).unwrap();
-    let told = told.into_inner();
-    let count = field.header.captured_samples;
-    assert_eq!(told.last(), Some(&(count, count)));
-    assert!(told.windows(2).all(|w| w[0].0 < w[1].0));
-}
-
-#[test]
-fn what_cannot_be_baked_is_bad_input() {
-    let Some(gpu) = gpu() else { return };
-    let mesh = generate::sphere(1.0, 2);
-    let refused = |edit: &dyn Fn(&mut FieldHeader)| {
-        let mut header = bake::header(&mesh, FieldKind::Occlusion, &small("cube:2x3", Storage::F16, 4));
-        edit(&mut header);
-        gpu.baker().field(&mesh, header, &quiet).map(|_| ()).expect_err("refused").exit_code()
-    };
-    assert_eq!(refused(&|h| h.bands = 9), 4);
-    assert_eq!(refused(&|h| h.face_px = 1), 4);
-    assert_eq!(refused(&|h| (h.lattice.inner, h.lattice.outer) = (0.2, 0.8)), 4, "every sample lies inside");
 }
 
 /// A stored half is what rounding makes of the exact number, not merely near it: to the nearest, or towards zero, as

@@ -2,7 +2,8 @@
 
 mod change;
 
-use crate::common::{Gpu, gpu, parse, relative_rms};
+use crate::common::{Gpu, gpu, parse};
+use crate::stage::against_rays;
 use shadow_fields::check::sharp as check;
 use shadow_fields::draw::{Antialias, Shading};
 use shadow_fields::frame::{self};
@@ -13,16 +14,10 @@ use shadow_fields::truth::{RayCast, World, sample_vertices};
 /// Relative root mean square error of the light on vertices against rays.
 fn error(gpu: &Gpu, scene: &Scene, options: frame::Options, rays: u32) -> f64 {
     let placements = scene.at(0.0);
-    let mut frame = gpu.frame(scene, options);
-    frame.render(&placements, None).unwrap();
+    let light = gpu.light(&mut gpu.frame(scene, options), &placements);
     let vertices = sample_vertices(scene, 800, 3);
-    let world = World::of(scene, &placements);
-    let truth = RayCast { rays, runs: 2, ..Default::default() }.run(&world, &vertices);
-    let lit: Vec<Vec<[f32; 3]>> = (0..scene.entities.len())
-        .map(|entity| if scene.entities[entity].receives { frame.radiosity(entity).unwrap() } else { Vec::new() })
-        .collect();
-    let found = vertices.iter().flat_map(|vertex| lit[vertex.entity][vertex.index]).map(f64::from);
-    relative_rms(found.zip(truth.iter().flat_map(|truth| truth.radiosity)))
+    let cast = RayCast { rays, runs: 2, ..Default::default() };
+    against_rays(&light, &vertices, &cast.run(&World::of(scene, &placements), &vertices))
 }
 
 const HEAD: &str = "[camera]\neye = [0, 2, 5]\ntarget = [0, 0.5, 0]\n\

@@ -54,19 +54,6 @@ fn evaluation_equals_the_slow_twin() {
 }
 
 #[test]
-fn fewer_bands_are_a_prefix_and_leave_the_rest_alone() {
-    let d = random_direction(&mut Rng::with_seed(2));
-    let all = values(MAX_BANDS, d);
-    for bands in 1..=MAX_BANDS {
-        let mut out = [7.0; MAX_COEFFICIENTS];
-        evaluate(bands, d, &mut out);
-        let count = coefficient_count(bands);
-        assert_eq!(out[..count], all[..count]);
-        assert!(out[count..].iter().all(|&x| x == 7.0));
-    }
-}
-
-#[test]
 #[should_panic(expected = "bands must be 1 to 8")]
 fn nine_bands_are_refused() {
     evaluate(9, DVec3::Z, &mut [0.0; 81]);

@@ -79,7 +79,7 @@ fn a_ball_under_a_uniform_sky_takes_its_closed_form() {
 }
 
 #[test]
-fn a_sphere_light_shines_as_its_closed_form_and_is_hidden_by_what_is_nearer() {
+fn a_sphere_light_shines_as_its_closed_form() {
     let light =
         "[[entity]]\nmesh = \"ball\"\nposition = [0, 2.5, 0]\nscale = 0.4\nemission = [9, 9, 9]\nreceives = false\n";
     let open = scene(light);
@@ -96,49 +96,6 @@ fn a_sphere_light_shines_as_its_closed_form_and_is_hidden_by_what_is_nearer() {
             estimate.radiosity[0]
         );
     }
-    // Below the ball the light is wholly hidden; from above it, not.
-    let hidden = scene(&format!("{BALL}{light}"));
-    let centre = Vertex { entity: 0, index: positions.iter().position(|p| p.length() < 1e-6).unwrap() };
-    let dark = RayCast::default().run(&World::of(&hidden, &hidden.at(0.0)), &[centre]);
-    assert_eq!(dark[0].radiosity, [0.0; 3]);
-    let mut swapped = hidden.at(0.0);
-    (swapped[1].position, swapped[2].position) = (Vec3::new(0.0, 2.5, 0.0), Vec3::new(0.0, 1.0, 0.0));
-    let bright = RayCast::default().run(&World::of(&hidden, &swapped), &[centre]);
-    assert!(bright[0].radiosity[0] > 0.1, "{bright:?}");
-}
-
-#[test]
-fn a_receiver_shadows_itself_only_where_it_bends_inwards() {
-    let text = r#"
-        [camera]
-        eye = [0, 3, 6]
-        target = [0, 0, 0]
-        [environment]
-        uniform = [1, 1, 1]
-        [[mesh]]
-        name = "torus"
-        torus = { major_m = 1, minor_m = 0.4, segments = 48, sides = 24 }
-        [[entity]]
-        mesh = "torus"
-        albedo = [1, 1, 1]"#;
-    let scene = parse(text);
-    let world = World::of(&scene, &scene.at(0.0));
-    let vertices = receiver_vertices(&scene);
-    let cast = RayCast::default().run(&world, &vertices);
-    let mesh = &scene.meshes[0];
-    let (mut outer, mut inner) = (0, 0);
-    for (vertex, t0) in vertices.iter().zip(&cast) {
-        let (position, normal) = (mesh.positions[vertex.index], mesh.normals[vertex.index]);
-        let radial = Vec3::new(position.x, 0.0, position.z).normalize_or_zero().dot(normal);
-        if radial > 0.5 {
-            outer += 1;
-            assert!(t0.radiosity[0] > 0.97, "on the outside only the tessellation dims: {t0:?}");
-        } else if radial < -0.9 {
-            inner += 1;
-            assert!(t0.radiosity[0] < 0.9, "the hole dims: {t0:?}");
-        }
-    }
-    assert!(outer > 100 && inner > 50, "{outer}, {inner}");
 }
 
 #[test]
@@ -252,11 +209,11 @@ fn a_floor_blocks_the_light_from_below() {
     }
 }
 
-/// A picture by rays through pixels shows what rays from vertices find, where these lie densely.
+/// A picture by rays through pixels shows what they find, with its hue.
 #[test]
-fn pixels_and_dense_vertices_agree() {
+fn pictures_by_rays_keep_hues() {
     let text = text(&format!("{BALL}{}{SKY}", bulb(0.3, [1.5, 3.0, 0.5])));
-    let scene = parse(&text.replace("cells = 8", "cells = 96").replace("[0, 3, 6]", "[0, 5, 0.5]"));
+    let scene = parse(&text.replace("[0, 3, 6]", "[0, 5, 0.5]"));
     let world = World::of(&scene, &scene.at(0.0));
     let size = [48, 32];
     let rows = std::cell::Cell::new(0);
@@ -269,23 +226,4 @@ fn pixels_and_dense_vertices_agree() {
         let is_same = |(shown, linear): (&f32, &f32)| (shown - linear / most).abs() < 1e-6;
         assert!(shown.iter().zip(linear).all(is_same), "white is 1, hue kept: {shown:?} of {linear:?}");
     }
-
-    let vertices: Vec<Vertex> = receiver_vertices(&scene).into_iter().filter(|v| v.entity == 0).collect();
-    let lit = cast.run(&world, &vertices);
-    let points = pixels::lit_points(&world, size);
-    let mut apart = 0.0;
-    let mut whole = 0.0;
-    for (key, view) in points.iter().filter(|(key, _)| key.entity == 0) {
-        // The floor's vertices are rows of 97, 4 m wide.
-        let [x, z] = [view.position.x, view.position.z].map(|c| ((c + 2.0) * 24.0).clamp(0.0, 95.999));
-        let at = |row: f64, column: f64| lit[row as usize * 97 + column as usize].radiosity;
-        let [u, v] = [x.fract(), z.fract()];
-        for c in 0..3 {
-            let [near, far] = [z, z + 1.0].map(|row| at(row, x)[c] * (1.0 - u) + at(row, x + 1.0)[c] * u);
-            let wanted = near * (1.0 - v) + far * v;
-            apart += (f64::from(picture.linear[3 * key.index + c]) - wanted).powi(2);
-            whole += wanted * wanted;
-        }
-    }
-    assert!(whole > 0.0 && apart < 0.03_f64.powi(2) * whole, "{} of the radiosity", (apart / whole).sqrt());
 }

@@ -1,7 +1,8 @@
 // Light that pass "pixel light" has found for places on the screen: light that a surface sends out, and the shares of the
-// lights that its highlights are of. It holds for one entity at one depth; where there is none all is 0.
+// lights that its highlights are of. It holds for one side of an entity at one depth: of a thin wall the far side may be
+// marked where the near one is not. Where there is none all is 0.
 uint light_key(uint entity) {
-    return entity % 0xffff + 1;
+    return entity % 0x7fff + 1 << 1 | (gl_FrontFacing ? 1 : 0);
 }
 
 // `edge`: whether an edge is near that shows badly between here and the next texel.

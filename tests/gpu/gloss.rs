@@ -64,6 +64,24 @@ fn lower_error(found: &[f32], wanted: &[f32]) -> f64 {
     error(&found[lower.clone()], &wanted[lower])
 }
 
+/// A bar that hides part of a bright panel shows no highlight of it: the panel is behind the side that is seen.
+#[test]
+fn a_panel_behind_a_surface_leaves_no_highlight() {
+    let Some(gpu) = gpu() else { return };
+    let scene = scene(
+        "[[mesh]]\nname = \"panel\"\nplane = { size_m = 2, cells = 1 }\n\
+         [[mesh]]\nname = \"bar\"\ncuboid = { size_m = [0.4, 2.2, 0.03], cells = 8 }\n\
+         [[entity]]\nmesh = \"panel\"\nrotation = { axis = [1, 0, 0], angle_deg = 90 }\n\
+         position = [0, 0.2, -0.03]\nemission = [8, 8, 8]\n\
+         [[entity]]\nmesh = \"bar\"\nposition = [0, 0.2, 0]\nalbedo = [0.3, 0.3, 0.3]\ngloss = { roughness = 0.5 }\n",
+    );
+    let picture = gpu.picture(&scene, options(), f32::INFINITY);
+    let pixel = |x: usize, y: usize| picture[3 * (y * SIZE[0] as usize + x)];
+    assert_eq!(pixel(40, 32), 8.0, "the panel is seen beside the bar");
+    let brightest = (46..50).flat_map(|x| (16..48).map(move |y| pixel(x, y))).fold(0.0, f32::max);
+    assert!(brightest < 0.02, "{brightest}");
+}
+
 /// Under light that is the same from everywhere a white metal is as bright as the light, and one whose microfacets pass
 /// no light on to each other is as bright as its directional albedo.
 #[test]

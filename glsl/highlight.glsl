@@ -37,7 +37,7 @@ float share_by_edge(vec2 from, vec2 to) {
 struct Outline {
     vec2 ends[4];
     float lowest; // least cosine of the normal and those microfacets'
-    float above;  // share of a rectangle above the surface's horizon, by the heights of its corners
+    float above;  // share of a flat light above the surface's horizon, by the heights of those ends
     bool polygon;
 };
 
@@ -48,18 +48,18 @@ Outline outline_of(View view, mat3 surface, SeenLight light, mat3 axes) {
     outline.polygon = is_rectangle(light);
 #endif
     outline.lowest = 1.0;
-    float top = -1.0, bottom = 1.0;
+    vec4 heights;
     vec2 place = outline.polygon ? vec2(1.0) : vec2(1.0, 0.0);
     for (uint k = 0; k < 4; k++) {
         vec3 along = axes * along_axes(light, place);
         outline.ends[k] = slope_of(view, surface, along);
         outline.lowest = min(outline.lowest, dot(view.normal, normalize(along + view.toward)));
-        float height = dot(view.normal, along);
-        top = max(top, height);
-        bottom = min(bottom, height);
+        heights[k] = dot(view.normal, along);
         place = vec2(-place.y, place.x);
     }
-    outline.above = clamp(top / max(top - bottom, 1e-6), 0.0, 1.0);
+    vec2 half_turned = abs(0.5 * (heights.xy - heights.zw));
+    float reach = outline.polygon ? max(half_turned.x, half_turned.y) : length(half_turned);
+    outline.above = clamp(0.5 + 0.125 * dot(heights, vec4(1.0)) / max(reach, 1e-6), 0.0, 1.0);
     return outline;
 }
 
@@ -118,11 +118,12 @@ vec2 reflect_light(View view, vec3 to, Entity shining) {
     float omega = part_light(light, Block(vec2(0.0), 0.0, 1.0, 1.0), vec2(0.0), along_axes(light, vec2(0.0)));
     float low = lobe_of_part(view, light.toward, cosine, omega) * cosine * omega;
     value = mix(low, value, clamp((outline.lowest / view.alpha - LOW_FROM) / (LOW_TO - LOW_FROM), 0.0, 1.0));
-    value *= outline.polygon ? outline.above : clamp(0.5 + 0.5 * centre / light.sine, 0.0, 1.0);
+    float above = clamp(0.5 + 0.5 * centre / light.sine, 0.0, 1.0);
     bool seen = lit > 0.0;
 #if PANELS
+    above = is_panel(light) || outline.polygon ? outline.above : above;
     seen = seen && !(is_panel(light) && dot(light.facing, by_axes) > 0.0);
 #endif
     float term = schlick(half_cosine(view, along));
-    return seen ? value * vec2(1.0 - term, term) : vec2(0.0);
+    return seen ? above * value * vec2(1.0 - term, term) : vec2(0.0);
 }

@@ -162,6 +162,7 @@ impl<'a> Rendering<'a> {
     fn new(global: &'a Global, arguments: &'a Arguments, context: &'a Context, scene: &'a Scene) -> Result<Self> {
         let started = Instant::now();
         let options = arguments.picture.options.frame(scene)?;
+        let options = frame::Options { pictures: !arguments.reference, ..options };
         let frame = if arguments.reference && arguments.vertices.is_none() {
             None
         } else {

@@ -272,7 +272,7 @@ impl Seen {
 pub struct Counts<'c> {
     /// For each member whether it blocks at all.
     pub blocks: &'c [bool],
-    /// For each member whether the map has its shadows; `None` for no map.
+    /// For each member whether the map has its shadows, as only one that blocks may; `None` for no map.
     pub in_map: Option<&'c [bool]>,
     pub targets: &'c [Target],
     /// Boxes in the blockers' frame, their least and largest corners, in which something moves that hides what lies beyond.

@@ -28,7 +28,7 @@ use std::sync::{Arc, OnceLock};
 use std::time::Instant;
 
 /// Counts in every name of the cache: another number where a bake of surfaces computes something else.
-const VERSION: u32 = 29;
+const VERSION: u32 = 30;
 /// How far towards the middle of its triangles a vertex is seen from, as a share of the way: the light of a crease is
 /// that just inside each face. Where meshes are left as they are, so are the places from which they are seen.
 const NUDGE: f32 = 0.02;
@@ -611,7 +611,7 @@ impl GroupSpace<'_> {
                 let places = cluster.iter().map(|&v| mesh.positions[v as usize]);
                 let near = if has_maps { self.near(places) } else { Vec::new() };
                 let mut in_map = vec![false; self.blocks.len()];
-                near.iter().for_each(|&member| in_map[member as usize] = true);
+                near.iter().for_each(|&member| in_map[member as usize] = self.blocks[member as usize]);
                 let vertex = |&v: &u32| {
                     let v = v as usize;
                     let normal = mesh.normals[v];

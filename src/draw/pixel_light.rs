@@ -6,8 +6,8 @@
 //! from such edges, light is interpolated; the other pixels are evaluated. In a room of wide penumbras 20 % of the pixels
 //! of marked triangles are, and pictures differ by 0.0008 of their RMS from those of all pixels.
 //!
-//! Output: an image of the picture's size with light, shares of highlights' lights, depth and entity (`glsl/screen_light.glsl`),
-//! which pass "draw" looks up. It has one sample a pixel: an evaluation is made once a pixel, and llvmpipe skips pixels
+//! Output: an image of the picture's size with light, shares of highlights' lights, depth, entity and its side
+//! (`glsl/screen_light.glsl`), which pass "draw" looks up. It has one sample a pixel: an evaluation is made once a pixel, and llvmpipe skips pixels
 //! that are hidden or done where it has no others to test.
 
 use crate::draw::grid::{self, BLOCK_CELLS};
@@ -26,7 +26,7 @@ use bytemuck::{Pod, Zeroable};
 use rayon::prelude::*;
 use std::sync::{Arc, OnceLock};
 
-/// Texel of a pixel: light and blue's flag as halves, shares as bytes, depth, entity.
+/// Texel of a pixel: light and blue's flag as halves, shares as bytes, depth, entity and its side.
 const LIGHT: vk::Format = vk::Format::R32G32B32A32_UINT;
 /// Pixels along an edge of a coarse texel.
 const COARSE_PX: u32 = 4;

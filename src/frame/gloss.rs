@@ -13,6 +13,7 @@ use crate::gloss::twin::{Twin, TwinVertex};
 use crate::gloss::{DrawnReflections, Glossy, PIXEL_ROUGHNESS, ReflectionInputs, Reflections};
 use crate::gpu::{Buffer, Device};
 use crate::layout::{Cluster, GlossEntity, NONE, SHOWN_LIGHTS};
+use crate::lists::sight::Sight;
 use crate::scene::{Entity, LightMethod, MapIndices, Placement, Scene};
 use crate::scene_buffers::SceneBuffers;
 use crate::shaders::Library;
@@ -93,8 +94,12 @@ impl Frame {
         if self.reflections.is_none() {
             return Ok(());
         }
-        let sights =
-            if self.options.skip.hidden { self.sights(placements, &self.lit_cameras(viewports)) } else { None };
+        // How the cameras of viewports that show light see each entity.
+        let shown = viewports.iter().filter(|viewport| viewport.shows_light());
+        let cameras: Vec<_> = shown.map(|viewport| self.camera([viewport.area[2], viewport.area[3]])).collect();
+        let seen = |(index, placement)| cameras.iter().map(|camera| self.sight(camera, index, placement)).collect();
+        let sights: Option<Vec<Vec<Sight>>> = (self.options.skip.hidden && !cameras.is_empty())
+            .then(|| placements.iter().enumerate().map(seen).collect());
         let Some(reflections) = &self.reflections else { return Ok(()) };
         let eye = self.scene.data.camera.eye;
         let mut entities = vec![GlossEntity::default(); placements.len()];

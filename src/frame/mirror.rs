@@ -171,7 +171,7 @@ fn reflection(plane: DVec4) -> DMat4 {
 
 impl Mirror {
     /// The cameras of its pictures.
-    pub(super) fn cameras(&self) -> &[SightCamera] {
+    fn cameras(&self) -> &[SightCamera] {
         match &self.shape {
             Shape::Plane(plane) => std::slice::from_ref(&plane.camera),
             Shape::Probe(probe) => &probe.cameras,

@@ -349,8 +349,7 @@ impl Frame {
     }
 
     /// Radiosity of an entity's vertices in the mesh's order: linear RGB radiance that leaves the surface, without
-    /// emission; zero where it does not receive. After a picture of things that move, what it does not show may be of
-    /// an earlier time; see [`Frame::render`].
+    /// emission; zero where it does not receive.
     pub fn radiosity(&self, entity: usize) -> Result<Vec<[f32; 3]>> {
         self.radiosity.read(entity, self.order(entity))
     }

@@ -78,7 +78,7 @@ fn readback(device: &Arc<Device>, [width, height]: [u32; 2]) -> Result<Buffer> {
 
 impl Frame {
     /// Makes the pipelines of all that pictures of light show, before the first one.
-    pub fn make_pipelines(&mut self) -> Result<()> {
+    pub(super) fn make_pipelines(&mut self) -> Result<()> {
         if std::mem::replace(&mut self.picture.draw.is_made, true) {
             return Ok(());
         }

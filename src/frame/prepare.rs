@@ -4,14 +4,13 @@
 
 use super::Frame;
 use super::pixel::PixelChains;
-use super::viewport::{RadiositySource, Viewport};
+use super::viewport::Viewport;
 use crate::asset::edges::Edges;
 use crate::draw::smooth::Strips;
 use crate::error::Result;
 use crate::gpu::{Device, TexelView, Upload};
 use crate::layout::{self, CLUSTER_FORMAT, ENTRY_FORMAT};
 use crate::lists::incremental::{ClusterLists, Dirty, Merged};
-use crate::lists::sight::{Sight, SightCamera};
 use crate::merge::Merge;
 use crate::merge::variant::{MergePermutation, Reads};
 use crate::scene::Placement;
@@ -139,18 +138,6 @@ impl Frame {
         }
         self.picture.prepared = prepared;
         self.picture.lines.write(&strips)
-    }
-
-    /// The cameras of the viewports that show merged light.
-    pub(super) fn lit_cameras(&self, viewports: &[Viewport]) -> Vec<SightCamera> {
-        let shown = viewports.iter().filter(|viewport| viewport.radiosity == RadiositySource::Merged);
-        shown.map(|viewport| self.camera([viewport.area[2], viewport.area[3]])).collect()
-    }
-
-    /// How each entity is seen by each of some cameras; `None` where there are none, and light is for others to read.
-    pub(super) fn sights(&self, placements: &[Placement], cameras: &[SightCamera]) -> Option<Vec<Vec<Sight>>> {
-        let of = |(index, placement)| cameras.iter().map(|camera| self.sight(camera, index, placement)).collect();
-        (!cameras.is_empty()).then(|| placements.iter().enumerate().map(of).collect())
     }
 
     /// Goes over to storage blocks where texel views cannot hold the clusters and lists that the next merge reads.

@@ -48,8 +48,11 @@ fn check_loader(entry: &ash::Entry, validation: Validation, surface: &[&'static 
         ));
     }
     // SAFETY: as above.
-    let extensions = unsafe { entry.enumerate_instance_extension_properties(None) }
-        .checked("vkEnumerateInstanceExtensionProperties", "instance")?;
+    let extensions = match unsafe { entry.enumerate_instance_extension_properties(None) } {
+        // What the loader returns where a driver's description is no JSON.
+        Err(vk::Result::ERROR_OUT_OF_HOST_MEMORY) => return Err(loader::no_driver()),
+        other => other.checked("vkEnumerateInstanceExtensionProperties", "instance")?,
+    };
     let has = |name: &CStr| extensions.iter().any(|e| e.extension_name_as_c_str() == Ok(name));
     if let Some(missing) = surface.iter().find(|name| !has(name)) {
         let missing = missing.to_string_lossy();

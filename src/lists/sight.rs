@@ -1,5 +1,4 @@
-//! Which runs of a mesh's triangles the camera may see. What it cannot see is not drawn, and while things move it is
-//! not lit.
+//! Which runs of a mesh's triangles the camera may see. What it cannot see is not drawn, and reflects nothing to it.
 //!
 //! The test is conservative: it never calls a run unseen that a pixel shows. A run lies outside the picture where the
 //! sphere or the box around it lies outside by at least a pixel. Its triangles are backs where the cone of their

@@ -16,8 +16,8 @@ use crate::gpu::{Bind, Buffer, Commands, ComputePipeline, Device};
 use crate::layout::CLUSTER_VERTICES;
 use crate::shaders::Library;
 use std::sync::Arc;
-pub use variant::Variant;
 use variant::MergePermutation;
+pub use variant::Variant;
 
 /// What the pass reads, as its variant does: as blocks or through texel views ([`Bind::read`]).
 pub struct MergeInputs<'b> {

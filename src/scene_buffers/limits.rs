@@ -1,4 +1,4 @@
-//! Checks whether a scene fits a device, before anything is baked.
+//! Checks whether a scene's fields fit a device, before they are baked, and its lists.
 
 use super::ALIGNMENT;
 use crate::bake::SceneNeeds;
@@ -15,7 +15,7 @@ fn check_fields(bytes: u64, limits: &vk::PhysicalDeviceLimits, heap_bytes: u64) 
     let most = heap_bytes.min(u64::from(limits.max_storage_buffer_range));
     if bytes > most {
         return Err(Error::Input(format!(
-            "the scene's fields take {bytes} bytes, the device can bind {most}: use a smaller --lattice or f16 storage"
+            "the scene's fields take {bytes} bytes, the device takes {most}: use a smaller --lattice or f16 storage"
         )));
     }
     Ok(())

@@ -212,8 +212,7 @@ impl Viewer {
         self.overlay.reload(&self.setup.library)?;
         // Beside a bake the frame that follows it compiles them.
         if self.frame.is_some() && self.bake.is_none() {
-            let mut frame = self.new_frame()?;
-            frame.make_pipelines()?;
+            let frame = self.new_frame()?;
             self.take(frame);
         }
         self.show = show;

@@ -131,7 +131,6 @@ fn a_broken_description_of_a_driver_is_no_driver() {
     without_drivers(&mut devices).env("VK_DRIVER_FILES", "icd.json").env("VK_ICD_FILENAMES", "icd.json");
     let ran = finish(&mut devices);
     assert_eq!(ran.code, 3, "{}", ran.stderr);
-    let lines: Vec<&str> = ran.stderr.lines().collect();
-    assert!(lines.iter().any(|line| line.contains("icd.json: ") && line.contains("JSON")), "{}", ran.stderr);
+    assert!(ran.stderr.contains("no Vulkan driver found") && ran.stderr.contains("is icd.json"), "{}", ran.stderr);
     assert_clean(&ran.stderr);
 }

@@ -13,7 +13,7 @@ fn read_text(text: &str, model: &Model) -> shadow_fields::Result<gltf::Import> {
     gltf::load(&path, &Default::default())
 }
 
-/// Any accessor may lack a bufferView: its numbers are zeros.
+/// Accessors may lack a bufferView: their numbers are zeros.
 #[test]
 fn accessors_without_a_view_are_zeros() {
     let mut copies = 0;

@@ -1,4 +1,4 @@
-//! A real window on a virtual display: every control, resizing, minimising, a screenshot against `render`, a clean end.
+//! A real window on a virtual display: a key of each kind, resizing, minimising, a screenshot against `render`, a clean end.
 
 use crate::cli::{COARSE, Folder, SMALL, finish};
 use crate::viewing::{OPTIONS, PATIENCE, SIZE, View, desk, open};

@@ -44,7 +44,7 @@ impl Stand {
             },
             library: gpu.library.clone(),
             cache: Cache::new(Some(&cache)),
-            frame: frame::Options { size: SIZE, ..shadow_fields::check::merge::options() },
+            frame: frame::Options { size: SIZE, pictures: true, ..shadow_fields::check::merge::options() },
             refines: false,
             format: FORMAT,
             seed: 1,

@@ -57,9 +57,14 @@ Outline outline_of(View view, mat3 surface, SeenLight light, mat3 axes) {
         heights[k] = dot(view.normal, along);
         place = vec2(-place.y, place.x);
     }
-    vec2 half_turned = abs(0.5 * (heights.xy - heights.zw));
-    float reach = outline.polygon ? max(half_turned.x, half_turned.y) : length(half_turned);
-    outline.above = clamp(0.5 + 0.125 * dot(heights, vec4(1.0)) / max(reach, 1e-6), 0.0, 1.0);
+    float top = max(max(heights.x, heights.y), max(heights.z, heights.w));
+    float bottom = min(min(heights.x, heights.y), min(heights.z, heights.w));
+    if (!outline.polygon) {
+        float middle = 0.25 * dot(heights, vec4(1.0)), reach = 0.5 * length(heights.xy - heights.zw);
+        top = middle + reach;
+        bottom = middle - reach;
+    }
+    outline.above = clamp(top / max(top - bottom, 1e-6), 0.0, 1.0);
     return outline;
 }
 

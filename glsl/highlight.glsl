@@ -126,7 +126,7 @@ vec2 reflect_light(View view, vec3 to, Entity shining) {
     float above = clamp(0.5 + 0.5 * centre / light.sine, 0.0, 1.0);
     bool seen = lit > 0.0;
 #if PANELS
-    above = is_panel(light) || outline.polygon ? outline.above : above;
+    above = is_panel(light) ? outline.above : above;
     seen = seen && !(is_panel(light) && dot(light.facing, by_axes) > 0.0);
 #endif
     float term = schlick(half_cosine(view, along));

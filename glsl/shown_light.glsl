@@ -8,8 +8,8 @@ void find_light(uint entity, bool wanted, inout vec3 light, inout vec4 shares) {
     const ivec2 BESIDE[4] = ivec2[](ivec2(1, 0), ivec2(-1, 0), ivec2(0, 1), ivec2(0, -1));
     float off = SAME_DEPTH * gl_FragCoord.z + 2.0 * fwidth(gl_FragCoord.z);
     ivec2 last = textureSize(screen_light, 0) - 1;
-    uvec4 texel = texelFetch(screen_light, min(ivec2(gl_FragCoord.xy), last), 0);
-    bool found = wanted && is_of(texel, entity, gl_FragCoord.z, off), seeks = wanted && !found;
+    uvec4 texel = texelFetch(screen_light, ivec2(gl_FragCoord.xy), 0);
+    bool seeks = wanted && !is_of(texel, entity, gl_FragCoord.z, off);
     // A loop, because a software device runs a branch that no lane takes. On lavapipe a lane that leaves one before others
     // may lose what it has computed there: those that seek leave it together.
     uvec4 beside = uvec4(0);
@@ -21,7 +21,7 @@ void find_light(uint entity, bool wanted, inout vec3 light, inout vec4 shares) {
         i++;
     } while (seeks && i < 4);
     texel = seeks ? beside : texel;
-    found = found || seeks && beside != uvec4(0);
+    bool found = wanted && texel != uvec4(0);
     light = found ? light_of(texel) : light;
     shares = found ? shares_of(texel) : shares;
 }

@@ -480,8 +480,8 @@ impl CellHits {
             cut_distances = caster.map_distances_past(&cut_toward, &cut_hits);
             cut_distances.extend(caster.map_distances(&cuts(&only_in_map)));
         }
-        let cut = at_edges.into_iter().chain(only_in_map);
-        let cut = cut.map(|cell| CutCell { cell, at_map_edge: at_map_edge(cell) }).collect();
+        let cut = at_edges.into_iter().map(|cell| CutCell { cell, at_map_edge: at_map_edge(cell) });
+        let cut = cut.chain(only_in_map.into_iter().map(|cell| CutCell { cell, at_map_edge: true })).collect();
         CellHits { hits, distances, cut, cut_hits, cut_distances }
     }
 

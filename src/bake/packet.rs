@@ -321,7 +321,7 @@ impl Blockers {
             if node.prim_count > 0 {
                 for triangle in node.first_index..node.first_index + node.prim_count {
                     let member = self.members[triangle as usize] as usize;
-                    if owner == MIXED && !counts[member] {
+                    if !counts[member] {
                         continue;
                     }
                     match self.masks.get(member) {

@@ -77,14 +77,6 @@ fn readback(device: &Arc<Device>, [width, height]: [u32; 2]) -> Result<Buffer> {
 }
 
 impl Frame {
-    /// Makes the pipelines of all that pictures of light show, before the first one.
-    pub(super) fn make_pipelines(&mut self) -> Result<()> {
-        if std::mem::replace(&mut self.picture.draw.is_made, true) {
-            return Ok(());
-        }
-        self.picture.make_pipelines(&self.scene, &self.buffers, self.reflections.is_some())
-    }
-
     /// Input of [`super::record()`] for the picture that was prepared last; `white` as in [`Frame::render`].
     pub fn picture_work(&self, placements: &[Placement], white: f32) -> PictureWork<'_> {
         let viewport = |(viewport, lines): &(Viewport, Range<u32>)| DrawnViewport {

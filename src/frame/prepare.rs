@@ -69,8 +69,8 @@ impl Frame {
             self.prepare_merge(placements)?;
             self.fit_lists()?;
         }
-        if viewports.iter().any(Viewport::shows_light) {
-            self.make_pipelines()?;
+        if viewports.iter().any(Viewport::shows_light) && !std::mem::replace(&mut self.picture.draw.is_made, true) {
+            self.picture.make_pipelines(&self.scene, &self.buffers, self.reflections.is_some())?;
         }
         if !viewports.is_empty() {
             self.prepare_chains()?;

@@ -69,7 +69,7 @@ const LIMITS: &[Row<fn(&mut ash::vk::PhysicalDeviceLimits)>] = &[
         Refused(3, "sampled images a stage, the device takes 0")),
     ("storage buffers of 128 MiB", &[], |l| l.max_storage_buffer_range = 1 << 27, Same),
     ("storage buffers of 512 bytes", &[], |l| l.max_storage_buffer_range = 512,
-        Refused(4, "the device can bind 512")),
+        Refused(4, "bytes, the device takes 512")),
     ("uniform buffers of 16 KiB", &["--variant", "storage-uniform"], |l| l.max_uniform_buffer_range = 1 << 14, Same),
     ("texel buffers of 65536 texels", &["--variant", "texel-packed"], |l| l.max_texel_buffer_elements = 1 << 16, Same),
     ("texel buffers of 4 texels", &["--variant", "texel-packed"], |l| l.max_texel_buffer_elements = 4, Refused(4, "(4)")),

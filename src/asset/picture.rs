@@ -7,6 +7,7 @@ use std::io::Write;
 use std::path::Path;
 
 use image::ImageEncoder as _;
+use rayon::prelude::*;
 
 use crate::error::{Error, Result};
 use crate::files;
@@ -25,7 +26,7 @@ pub fn linear_from_srgb(encoded: f32) -> f32 {
 /// 8-bit sRGB of linear RGB after multiplication by 2^exposure_ev, clamped, rounded to nearest.
 pub fn encode_srgb(linear_rgb: &[f32], exposure_ev: f32) -> Vec<u8> {
     let gain = exposure_ev.exp2();
-    linear_rgb.iter().map(|c| (srgb_from_linear(c * gain) * 255.0).round() as u8).collect()
+    linear_rgb.par_iter().map(|c| (srgb_from_linear(c * gain) * 255.0).round() as u8).collect()
 }
 
 /// Writes linear RGB as 8-bit sRGB PNG; a text chunk `Exposure` states the exposure in stops.
@@ -83,6 +84,8 @@ fn rgb8_encoder<'a, W: Write>(file: W, width: u32, height: u32) -> png::Encoder<
     let mut encoder = png::Encoder::new(file, width, height);
     encoder.set_color(png::ColorType::Rgb);
     encoder.set_depth(png::BitDepth::Eight);
+    // The default makes files a quarter smaller and takes longer than a frame does: 60 ms for 1280x720 pixels.
+    encoder.set_compression(png::Compression::Fast);
     encoder.set_source_srgb(png::SrgbRenderingIntent::RelativeColorimetric);
     encoder
 }

@@ -311,6 +311,14 @@ impl Mesh {
         self
     }
 
+    /// The mesh with its backs for fronts.
+    pub(crate) fn turned_over(mut self) -> Result<Self> {
+        self.normals.iter_mut().for_each(|normal| *normal = -*normal);
+        self.triangles.iter_mut().for_each(|triangle| triangle.swap(1, 2));
+        let attributes = self.attributes();
+        Self::with_attributes(self.name, self.positions, self.normals, attributes, self.triangles)
+    }
+
     /// Whether the backs of triangles are triangles too. Of a mesh as it was read, they are the second half.
     pub fn is_two_sided(&self) -> bool {
         self.two_sided

@@ -1,11 +1,16 @@
 //! Materials of glTF files: textures, emission, colours of vertices, and what is left out.
 
+use crate::common::{generate, gpu, joined};
 use crate::model;
-use glam::Vec3;
-use model::{Model, U8, load};
+use glam::{Mat3, Vec3};
+use model::{Model, U8, cuboid, load};
 use serde_json::json;
+use shadow_fields::asset::Mesh;
 use shadow_fields::asset::picture::{linear_from_srgb, write_png};
+use shadow_fields::bake;
+use shadow_fields::frame;
 use shadow_fields::scene::{Gloss, Maps, Scene};
+use shadow_fields::truth::{RayCast, Vertex, World};
 
 /// A square of 2 x 2 m with coordinates of textures, of a material that is no metal unless it says so.
 fn square(model: &mut Model, mut material: serde_json::Value, with_uv: bool) -> usize {
@@ -302,4 +307,89 @@ fn blended_and_transmissive_surfaces_let_light_through() {
         assert!((found.opacity - opacity).abs() < 1e-6 && (found.albedo.x - albedo).abs() < 1e-6, "{found:?}");
         assert_eq!(found.transparent, opacity < 1.0);
     }
+}
+
+fn inside_out(mesh: &Mesh) -> Mesh {
+    let normals = mesh.normals.iter().map(|normal| -*normal).collect();
+    let triangles = mesh.triangles.iter().map(|[a, b, c]| [*a, *c, *b]).collect();
+    Mesh::new("inside out", mesh.positions.clone(), normals, None, triangles).unwrap()
+}
+
+/// A room, wound to face inwards or outwards, with things in it, all of them double-sided, and a lamp behind a page.
+fn study(outwards: bool) -> Model {
+    let mut model = Model::default();
+    // A square that stands upright and faces +z.
+    let page = |size_m: f32, at: [f32; 3]| {
+        let flat = generate::plane(size_m, 8);
+        let up = |v: &Vec3| Mat3::from_rotation_x(std::f32::consts::FRAC_PI_2) * *v;
+        let positions = flat.positions.iter().map(up).collect();
+        let normals = flat.normals.iter().map(up).collect();
+        joined(&[(&Mesh::new("page", positions, normals, None, flat.triangles).unwrap(), Vec3::from(at))])
+    };
+    let room = cuboid([-2., 0., -2.], [2., 3., 2.]);
+    let crate_ = cuboid([1., 0., -1.], [1.5, 0.5, -0.5]);
+    let shapes = [
+        ("room", if outwards { room } else { inside_out(&room) }),
+        ("crate", crate_.clone()),
+        ("crate, inside out", joined(&[(&inside_out(&crate_), Vec3::new(-2.5, 0.0, 0.0))])),
+        ("page", page(0.8, [0., 1., 0.3])),
+        ("picture", page(1.0, [0., 1.5, -1.98])),
+    ];
+    let pbr = json!({ "baseColorFactor": [0.7, 0.6, 0.5, 1.0], "metallicFactor": 0 });
+    for (name, mesh) in shapes {
+        let material = model.push("materials", json!({ "doubleSided": true, "pbrMetallicRoughness": pbr }));
+        let mesh = model.shape(&mesh, Some(material));
+        model.node(json!({ "name": name, "mesh": mesh }));
+    }
+    let lamp = model.light(json!({ "type": "point", "intensity": 20 }));
+    model.node(json!({ "name": "lamp", "translation": [0.8, 1.5, -0.6], "extensions": lamp }));
+    let camera = json!({ "type": "perspective", "perspective": { "yfov": 0.7, "znear": 0.1 } });
+    let camera = model.push("cameras", camera);
+    model.node(json!({ "camera": camera, "translation": [0, 1.2, 1.8] }));
+    model
+}
+
+#[test]
+fn double_sided_shapes_have_the_sides_that_are_seen() {
+    for outwards in [false, true] {
+        let (scene, notes) = model::scene(&study(outwards));
+        assert_eq!(notes.left_out(), [""; 0]);
+        let mesh = |name: &str| {
+            let entity = scene.entities.iter().find(|entity| entity.name == name).unwrap();
+            &scene.meshes[entity.mesh]
+        };
+        for (name, outwards) in [("room", false), ("crate", true), ("crate, inside out", true)] {
+            let mesh = mesh(name);
+            let (centre, _) = mesh.bounding_sphere();
+            let mut vertices = mesh.positions.iter().zip(&mesh.normals);
+            assert!(vertices.all(|(at, normal)| (normal.dot(*at - centre) > 0.0) == outwards), "{name}");
+            assert_eq!((mesh.is_solid(), mesh.triangles.len()), (outwards, 12), "{name}");
+        }
+        assert!(mesh("page").is_two_sided() && !mesh("picture").is_two_sided());
+    }
+
+    // One side of the page is in the lamp's light.
+    let Some(gpu) = gpu() else { return };
+    let (scene, _) = model::scene(&study(false));
+    let page = scene.entities.iter().position(|entity| entity.name == "page").unwrap();
+    let options =
+        frame::Options { bake: bake::Options { groups: true, ..bake::Quality::Draft.options() }, ..Default::default() };
+    let mut frame = gpu.frame(&scene, options);
+    let placements = scene.at(0.0);
+    let light = gpu.light(&mut frame, &placements).swap_remove(page);
+    let vertices: Vec<Vertex> = (0..light.len()).map(|index| Vertex { entity: page, index }).collect();
+    let rays =
+        RayCast { rays: 256, bounces: 24, ..Default::default() }.run(&World::of(frame.scene(), &placements), &vertices);
+    let normals = &frame.scene().surface(page).normals;
+    let side = |all: &[f64], back: bool| {
+        let of: Vec<f64> = all.iter().zip(normals).filter(|(_, n)| (n.z < 0.0) == back).map(|(x, _)| *x).collect();
+        of.iter().sum::<f64>() / of.len() as f64
+    };
+    let found: Vec<f64> = light.iter().map(|rgb| f64::from(rgb[0])).collect();
+    let expected: Vec<f64> = rays.iter().map(|estimate| estimate.radiosity[0]).collect();
+    let sides = [false, true].map(|back| (side(&found, back), side(&expected, back)));
+    for (found, expected) in sides {
+        assert!((found / expected - 1.0).abs() < 0.1, "{sides:?}");
+    }
+    assert!(sides[1].1 > 2.0 * sides[0].1, "the lamp stands behind the page: {sides:?}");
 }

@@ -15,7 +15,7 @@
 //! | meshes compressed by Draco and meshoptimizer; KTX2 and WebP | as if they were not |
 //! | base colour factor | albedo |
 //! | base colour texture, colours of vertices, alpha mask | texture; tints of the mesh's vertices |
-//! | double-sided surfaces that alpha cuts out | backs of their own; all others are lit from their fronts |
+//! | double-sided surfaces that alpha cuts out, or that something in the scene sees from behind | backs of their own; all others are lit from their fronts |
 //! | alpha blending with the mean of vertices, transmission | opacity, of transmission less the luminance of what passes: glass is thin and grey |
 //! | roughness, metal, index of refraction, specular factor | gloss |
 //! | textures of roughness and metal, of normals | maps |
@@ -28,6 +28,7 @@
 
 mod accessor;
 mod animation;
+mod backs;
 mod camera;
 mod compressed;
 mod document;
@@ -58,6 +59,7 @@ use crate::scene::motion::RotationData;
 use crate::scene::values::{POSITION_LIMIT_M, SCALE_LIMIT};
 use crate::scene::{ENTITY_LIMIT, MESH_LIMIT, Maps, Surroundings, check_counts, framing};
 use animation::Tracks;
+use backs::{Onlookers, Owner, Sides};
 use document::Document;
 #[cfg(feature = "cli")]
 pub(super) use document::{FILE_LIMIT_BYTES, split};
@@ -212,6 +214,8 @@ pub(super) struct Reader {
     stage: Option<Rc<Stage>>,
     textures: Textures,
     primitives: HashMap<PartKey, Option<Rc<Primitive>>>,
+    /// What sees the backs of surfaces; `None` within for a scene that is too large.
+    onlookers: Option<Option<Rc<Onlookers>>>,
     triangle_count: usize,
     notes: Notes,
 }
@@ -224,6 +228,7 @@ impl Reader {
             document,
             stage: None,
             primitives: HashMap::new(),
+            onlookers: None,
             triangle_count: 0,
             notes: Notes::default(),
         }
@@ -257,7 +262,7 @@ impl Reader {
         }
         let primitive = self.primitive(part)?.ok_or_else(|| fail(&self.document, "it has no triangles"))?;
         let mesh = primitive.mesh(&self.document, part.piece, bend, name)?;
-        self.counted(&primitive, mesh)
+        self.counted(&[part], &primitive, mesh)
     }
 
     /// The mesh of primitives at rest, each given by its place, a node or an instance of it, and its number.
@@ -266,6 +271,7 @@ impl Reader {
         let stage = self.stage()?;
         let mut joined = Joined::default();
         let mut first: Option<Rc<Primitive>> = None;
+        let mut parts = Vec::new();
         for &[place, at] in members {
             let fail = |what| document.fail(format!("place {place}, primitive {at}"), what);
             let stand = stage.stands.get(place).ok_or_else(|| fail("there is no such place"))?;
@@ -280,17 +286,64 @@ impl Reader {
             }
             joined.add(&document, &primitive.shape, stand.rest, attributes)?;
             first.get_or_insert(primitive);
+            parts.push(part);
         }
         let first = first.ok_or_else(|| document.fail("meshes", "a joined mesh has no primitives"))?;
         let mesh = joined.mesh(name).map_err(|error| document.fail(&first.shape.place, error))?;
-        self.counted(&first, mesh)
+        self.counted(&parts, &first, mesh)
     }
 
-    /// Counts the triangles of a mesh that the scene keeps, and adds its backs.
-    fn counted(&mut self, primitive: &Primitive, mesh: Mesh) -> Result<Mesh> {
+    /// Counts the triangles of a mesh that the scene keeps, and gives it the sides that are seen of the parts it is made
+    /// of, which look as `primitive` does.
+    fn counted(&mut self, parts: &[Part], primitive: &Primitive, mesh: Mesh) -> Result<Mesh> {
         self.triangle_count += mesh.triangles.len();
         join::check_triangles(&self.document, &primitive.shape, self.triangle_count)?;
-        Ok(if primitive.surface.has_backs && !mesh.is_closed() { mesh.with_backs() } else { mesh })
+        let surface = &primitive.surface;
+        if !surface.is_double_sided || surface.has_alpha() && mesh.is_closed() {
+            return Ok(mesh);
+        }
+        if surface.has_alpha() {
+            return Ok(mesh.with_backs());
+        }
+        let Some(onlookers) = self.onlookers()?.filter(|_| surface.is_solid()) else { return Ok(mesh) };
+        let of = |part: &Part| onlookers.sides([part.mesh, part.at], part.piece, mesh.is_solid());
+        let sides: Vec<Sides> = parts.iter().map(of).collect();
+        match sides[0] {
+            first if sides.iter().any(|other| *other != first) => Ok(mesh.with_backs()),
+            Sides::Front => Ok(mesh),
+            Sides::Both => Ok(mesh.with_backs()),
+            Sides::Back => mesh.turned_over(),
+        }
+    }
+
+    /// What sees the backs of surfaces, found once; `None` for a scene that is too large.
+    fn onlookers(&mut self) -> Result<Option<Rc<Onlookers>>> {
+        if let Some(onlookers) = &self.onlookers {
+            return Ok(onlookers.clone());
+        }
+        let document = self.document.clone();
+        let stage = self.stage()?;
+        let mut surfaces = Vec::new();
+        for stand in &stage.stands {
+            let node = &document.root.nodes[stand.node];
+            let Some(mesh) = node.mesh.map(|mesh| mesh.value()) else { continue };
+            for at in 0..document.root.meshes[mesh].primitives.len() {
+                // Skins are looked at as they are stored: a pose turns nothing inside out.
+                let Some(primitive) = self.primitive(Part { mesh, at, pose: None, piece: None })? else { continue };
+                let is_opaque = primitive.surface.opacity == 1.0 && !primitive.surface.has_alpha();
+                let owner = |piece| Owner { primitive: [mesh, at], piece };
+                let place = if node.skin.is_some() { DAffine3::IDENTITY } else { stand.rest };
+                let corners = primitive.shape.corners(place).filter(|_| is_opaque);
+                surfaces.extend(corners.map(|(piece, corners)| (owner(piece), corners)));
+            }
+        }
+        if surfaces.is_empty() || surfaces.len() > backs::TRIANGLES_LIMIT {
+            return Ok(self.onlookers.insert(None).clone());
+        }
+        let is_camera = |stand: &&Stand| document.root.nodes[stand.node].camera.is_some();
+        let cameras: Vec<Vec3> =
+            stage.stands.iter().filter(is_camera).map(|stand| stand.rest.translation.as_vec3()).collect();
+        Ok(self.onlookers.insert(Some(Rc::new(Onlookers::new(&surfaces, &cameras)))).clone())
     }
 
     /// The primitive of a part, if it has triangles; each is read once.
@@ -630,7 +683,7 @@ impl Builder {
             bend = frame.transpose() * bend;
             mesh = primitive.mesh(&document, part.piece, bend, &name)?;
         }
-        let mesh = self.reader.counted(primitive, mesh)?;
+        let mesh = self.reader.counted(&[part], primitive, mesh)?;
         self.names.insert(name.clone());
         let data = MeshData {
             file: Some(self.file.clone()),

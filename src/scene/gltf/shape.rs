@@ -190,6 +190,13 @@ impl Shape {
         })
     }
 
+    /// The corners of each triangle where the shape stands, and the piece to which it belongs.
+    pub fn corners(&self, place: DAffine3) -> impl Iterator<Item = (u32, [Vec3; 3])> {
+        let (positions, _, triangles) = self.bent(place.matrix3, place.translation);
+        let corners = triangles.into_iter().map(move |triangle| triangle.map(|v| positions[v as usize]));
+        self.pieces().iter().copied().zip(corners)
+    }
+
     pub fn piece_count(&self) -> u32 {
         self.pieces().iter().max().map_or(1, |last| last + 1)
     }

@@ -53,8 +53,7 @@ pub struct Surface {
     pub paint: Option<Paint>,
     /// How it reflects besides; an unlit surface does not.
     pub gloss: Option<Gloss>,
-    /// Whether an open shape that this covers has two sides: it is cut out by a texture, as leaves are.
-    pub has_backs: bool,
+    pub is_double_sided: bool,
     /// Share of light that does not pass; a texture may be another factor.
     pub opacity: f32,
     /// Its textures for that: gloss, normal and emission.
@@ -68,11 +67,15 @@ pub struct Surface {
 }
 
 impl Surface {
+    /// Whether a texture cuts it out or lets light through it.
+    pub fn has_alpha(&self) -> bool {
+        let paint = self.paint.as_ref();
+        paint.is_some_and(|paint| paint.texture.alpha_cutoff.is_some() || paint.texture.alpha_blend)
+    }
+
     /// Whether it lets no light through and does not glow.
     pub fn is_solid(&self) -> bool {
-        let has_alpha = |paint: &Paint| paint.texture.alpha_cutoff.is_some() || paint.texture.alpha_blend;
-        let passes_light = self.opacity < 1.0 || self.paint.as_ref().is_some_and(has_alpha);
-        !passes_light && self.emission == Vec3::ZERO
+        self.opacity == 1.0 && !self.has_alpha() && self.emission == Vec3::ZERO
     }
 
     /// The surface that a material gives a shape.
@@ -116,7 +119,6 @@ impl Surface {
         let alpha_cutoff = matches!(json.alpha_mode, Checked::Valid(AlphaMode::Mask))
             .then(|| (json.alpha_cutoff.map_or(0.5, |cutoff| cutoff.0) / alpha.max(1e-6)).clamp(0.0, 1.0));
         let alpha_blend = matches!(json.alpha_mode, Checked::Valid(AlphaMode::Blend));
-        let has_backs = json.double_sided && base.is_some() && (alpha_blend || alpha_cutoff.is_some());
         let paint = (base.is_some() || attributes.tints.is_some()).then(|| Paint {
             image: base.as_ref().map(|base| base.image),
             texture: Texture {
@@ -159,7 +161,17 @@ impl Surface {
                 Glow::Varied(colors) => attributes.colors = Some(colors),
             }
         }
-        Ok(Surface { albedo, paint, gloss, has_backs, opacity, maps, normal_scale, emission, attributes })
+        Ok(Surface {
+            albedo,
+            paint,
+            gloss,
+            is_double_sided: json.double_sided,
+            opacity,
+            maps,
+            normal_scale,
+            emission,
+            attributes,
+        })
     }
 }
 

@@ -364,6 +364,15 @@ bool has_own_outline(Entity shining) {
 #endif
 }
 
+// Whether the vertices around see nothing of the light of an entry's chain.
+bool is_dark(uint packed) {
+#if STATES
+    return (light_states >> state_bit(chain_light(packed)) & 3) == DARK;
+#else
+    return false;
+#endif
+}
+
 // Whether an entry is an occluder whose ball reaches into the cone around all parts of its chain's light, as far as the
 // light.
 bool may_block(uint packed, Surface surface) {
@@ -372,7 +381,7 @@ bool may_block(uint packed, Surface surface) {
     }
 #if STATES
     uint state = light_states >> state_bit(chain_light(packed)) & 3;
-    if (state == OPEN || state == DARK || (near_occluders & occluder_bit(packed & SKY_CHAIN)) == 0) {
+    if (state == OPEN || is_dark(packed) || (near_occluders & occluder_bit(packed & SKY_CHAIN)) == 0) {
         return false;
     }
 #endif
@@ -395,7 +404,8 @@ bool may_block(uint packed, Surface surface) {
 #endif
 
 // The first entry from `i` on that has to be evaluated. With CONES these are occluders that may block, and lights that
-// end a chain of which an occluder was evaluated (`within`) or that have an outline of their own; without CONES all.
+// end a chain of which an occluder was evaluated (`within`) or that have an outline of their own and are not dark;
+// without CONES all.
 // Values of this loop are read again behind it: on lavapipe a lane that leaves a loop early may lose what the loop does
 // not carry.
 uint next_entry(Surface surface, uint first, uint count, uint i, bool within) {
@@ -404,7 +414,8 @@ uint next_entry(Surface surface, uint first, uint count, uint i, bool within) {
     do {
         uint packed = entry_at(first + i);
         bool ends = (packed & ENTRY_LIGHT) != 0;
-        passes = ends ? !within && !has_own_outline(ENTITY(chain_light(packed))) : !may_block(packed, surface);
+        bool is_skipped = is_dark(packed) || !has_own_outline(ENTITY(chain_light(packed)));
+        passes = ends ? !within && is_skipped : !may_block(packed, surface);
         i += passes ? 1 : 0;
     } while (passes && i < count);
 #endif
@@ -586,13 +597,9 @@ vec3 open_sum(Surface surface, uint first, uint count) {
             ends = (packed & ENTRY_LIGHT) != 0;
             i += ends ? 0 : 1;
         } while (!ends);
-        Entity shining = ENTITY(chain_light(entry_at(first + i)));
-#if STATES
-        bool dark = (light_states >> state_bit(chain_light(entry_at(first + i))) & 3) == DARK;
-#else
-        const bool dark = false;
-#endif
-        if (open && !dark && !has_own_outline(shining)) {
+        uint packed = entry_at(first + i);
+        Entity shining = ENTITY(chain_light(packed));
+        if (open && !is_dark(packed) && !has_own_outline(shining)) {
             sum += chain_sum(surface, shining, true, first, count, i);
         } else {
             i++;

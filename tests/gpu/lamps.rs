@@ -245,3 +245,22 @@ fn no_light_comes_through_the_slab_above_a_lamp() {
     let error = picture_error(&gpu, &scene.build().unwrap());
     assert!(error < 0.04, "{error}");
 }
+
+/// Below a table all lamps above it are hidden, though they are no balls.
+#[test]
+fn several_lamps_leave_a_table_its_shadow() {
+    let Some(gpu) = gpu() else { return };
+    let mut scene = Scene::builder()
+        .camera(Camera::new([0.0, 2.0, 2.2], [0.0, 0.0, -0.2]))
+        .mesh("floor", Generator::Plane { size_m: 4.0, cells: 24 })
+        .mesh("top", generate::cuboid(Vec3::new(1.4, 0.05, 0.8), 1))
+        .mesh("lamp", generate::torus(0.03, 0.012, 16, 8))
+        .entity(EntityData::of_mesh("floor"))
+        .entity(EntityData { position: Vec3::new(0.0, 0.75, -0.3), ..EntityData::of_mesh("top") });
+    for x in [-0.45, 0.0, 0.4] {
+        let position = Vec3::new(x, 1.95, -0.2);
+        scene = scene.entity(EntityData { position, emission: Vec3::splat(9.0), ..EntityData::of_mesh("lamp") });
+    }
+    let error = picture_error(&gpu, &scene.build().unwrap());
+    assert!(error < 0.05, "{error}");
+}

@@ -78,7 +78,7 @@ pub fn neighbours<K: Ord>(mut candidates: Vec<Candidate<K>>, count: usize, trian
 }
 
 /// Halves candidates across their longest extent until each group fits.
-fn halve<K>(group: &mut [Candidate<K>], out: &mut Vec<Vec<usize>>, fits: &impl Fn(&[Candidate<K>]) -> bool) {
+pub fn halve<K>(group: &mut [Candidate<K>], out: &mut Vec<Vec<usize>>, fits: &impl Fn(&[Candidate<K>]) -> bool) {
     if group.len() == 1 || fits(group) {
         return out.push(group.iter().map(|c| c.part).collect());
     }

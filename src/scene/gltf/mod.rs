@@ -35,12 +35,14 @@ mod document;
 mod join;
 mod lamp;
 mod notes;
+mod pieces;
 mod pose;
 mod shape;
 mod surface;
 mod texture;
 mod tree;
 
+use std::cell::OnceCell;
 use std::collections::hash_map::Entry;
 use std::collections::{BTreeSet, HashMap, HashSet};
 use std::path::{Path, PathBuf};
@@ -161,12 +163,28 @@ struct Primitive {
     surface: Surface,
     material: Option<usize>,
     name: String,
+    pieces: OnceCell<Vec<u32>>,
 }
 
 impl Primitive {
     /// The mesh of all pieces or one under a bend.
     fn mesh(&self, document: &Document, piece: Option<u32>, bend: DMat3, name: &str) -> Result<Mesh> {
-        self.shape.mesh(document, name, bend, self.surface.attributes.clone(), piece)
+        let keeps = |triangle: usize| piece.is_none_or(|piece| self.pieces()[triangle] == piece);
+        self.shape.mesh(document, name, bend, self.surface.attributes.clone(), keeps)
+    }
+
+    /// The number of the piece that each triangle belongs to. Surfaces that let light through stay whole, and so do the
+    /// many cards of a plant, and what glows in a pattern.
+    fn pieces(&self) -> &[u32] {
+        self.pieces.get_or_init(|| {
+            let positions = self.shape.positions();
+            let triangles = self.shape.triangles();
+            match &self.surface {
+                surface if surface.is_solid() => pieces::solids(positions, triangles),
+                surface if surface.is_lamp() => pieces::lamps(positions, triangles),
+                _ => vec![0; triangles.len()],
+            }
+        })
     }
 }
 
@@ -333,8 +351,10 @@ impl Reader {
                 let is_opaque = primitive.surface.opacity == 1.0 && !primitive.surface.has_alpha();
                 let owner = |piece| Owner { primitive: [mesh, at], piece };
                 let place = if node.skin.is_some() { DAffine3::IDENTITY } else { stand.rest };
-                let corners = primitive.shape.corners(place).filter(|_| is_opaque);
-                surfaces.extend(corners.map(|(piece, corners)| (owner(piece), corners)));
+                if is_opaque {
+                    let corners = primitive.shape.corners(place);
+                    surfaces.extend(primitive.pieces().iter().zip(corners).map(|(piece, of)| (owner(*piece), of)));
+                }
             }
         }
         if surfaces.is_empty() || surfaces.len() > backs::TRIANGLES_LIMIT {
@@ -361,7 +381,7 @@ impl Reader {
             let surface = Surface::new(&document, material, &shape, &mut self.textures, &mut self.notes)?;
             let own = json.name.clone().unwrap_or_else(|| format!("mesh {mesh}"));
             let name = if json.primitives.len() > 1 { format!("{own} {at}") } else { own };
-            Ok(Rc::new(Primitive { shape, surface, material, name }))
+            Ok(Rc::new(Primitive { shape, surface, material, name, pieces: OnceCell::new() }))
         });
         let primitive = primitive.transpose()?;
         self.primitives.insert(part.key(), primitive.clone());
@@ -473,8 +493,7 @@ impl Builder {
         self.finish(&stage.stands, entities)
     }
 
-    /// The entities of parts and where they stand. Loose convex pieces become entities of their own, since their outlines
-    /// hold up to where they touch: a table is a board and its legs.
+    /// The entities of parts and where they stand, their pieces as entities of their own.
     fn entities(&mut self, mut parts: Vec<Placed>) -> Result<Vec<EntityData>> {
         let bend = |stand: &Stand| SplitTransform::new(stand.fixed.matrix3).map(|split| split.baked());
         let key = |placed: &Placed| Some(mesh_key(placed.part, bend(&placed.stand)?));
@@ -552,12 +571,10 @@ impl Builder {
         Ok(candidates)
     }
 
-    /// How many pieces a part is cut into. Lamps and surfaces that let light through stay whole, and so do the many cards
-    /// of a plant.
+    /// How many pieces a part is cut into.
     fn piece_count(&mut self, placed: &Placed) -> Result<u32> {
-        let Some(primitive) = self.reader.primitive(placed.part)? else { return Ok(1) };
-        let is_cut = primitive.surface.is_solid();
-        Ok(if is_cut { primitive.shape.piece_count() } else { 1 })
+        let primitive = self.reader.primitive(placed.part)?;
+        Ok(primitive.and_then(|primitive| primitive.pieces().iter().max().copied()).map_or(1, |last| last + 1))
     }
 
     /// The entity of a part, if it has triangles.

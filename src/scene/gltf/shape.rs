@@ -1,6 +1,5 @@
 //! Primitives of meshes as triangles.
 
-use std::cell::OnceCell;
 use std::collections::HashMap;
 
 use ::gltf::json::mesh::{Mode, Primitive, Semantic};
@@ -12,16 +11,8 @@ use super::document::Document;
 use super::notes::Notes;
 use super::pose::Pose;
 use crate::asset::mesh::{Attributes, TRIANGLE_LIMIT, area_m2};
-use crate::asset::{Mesh, enclose, topology};
+use crate::asset::{Mesh, enclose};
 use crate::error::Result;
-
-/// Most pieces that a primitive is cut into.
-const PIECES_LIMIT: usize = 64;
-/// Most triangles of a piece that is cut off. Such a convex solid has a closed form; others are as well off together, and
-/// each would take a second to bake.
-const PIECE_TRIANGLES: usize = 64;
-/// A piece of less than this share of the area stays with the rest.
-const SMALL_PIECE: f64 = 1e-3;
 
 /// The triangles of a primitive. Where it has no normals, every triangle has vertices of its own with its own normal,
 /// as the specification demands.
@@ -33,7 +24,6 @@ pub struct Shape {
     /// The element of the accessors that each vertex has.
     source: Vec<u32>,
     attributes: HashMap<Semantic, usize>,
-    pieces: OnceCell<Vec<u32>>,
 }
 
 /// Accessors of a primitive by what they hold.
@@ -106,7 +96,7 @@ impl Shape {
         let mut shape = match normals {
             Some(normals) => {
                 let source = (0..positions.len() as u32).collect();
-                Shape { place, positions, normals, triangles, source, attributes, pieces: OnceCell::new() }
+                Shape { place, positions, normals, triangles, source, attributes }
             }
             None => flat(place, &positions, &triangles, attributes),
         };
@@ -122,20 +112,18 @@ impl Shape {
         Ok(Some(shape))
     }
 
-    /// The mesh of all pieces or one, transformed by `bend`.
+    /// The mesh of those triangles whose numbers are kept, transformed by `bend`.
     pub fn mesh(
         &self,
         document: &Document,
         name: &str,
         bend: DMat3,
         attributes: Attributes,
-        piece: Option<u32>,
+        keeps: impl Fn(usize) -> bool,
     ) -> Result<Mesh> {
         let (positions, normals, mut triangles) = self.bent(bend, DVec3::ZERO);
-        if let Some(piece) = piece {
-            let mut numbers = self.pieces().iter();
-            triangles.retain(|_| numbers.next() == Some(&piece));
-        }
+        let mut numbers = 0..;
+        triangles.retain(|_| numbers.next().is_some_and(&keeps));
         if triangles.is_empty() {
             return Err(document.fail(&self.place, "there is no such piece"));
         }
@@ -158,47 +146,10 @@ impl Shape {
         sums.into_iter().map(|(sum, area)| if area > 0.0 { sum / area } else { Vec3::ZERO }).collect()
     }
 
-    /// The number of the piece that each triangle belongs to: those that are cut off, and last the rest. All are 0 where
-    /// none is cut off, or too many would be.
-    fn pieces(&self) -> &[u32] {
-        self.pieces.get_or_init(|| {
-            let numbers = topology::piece_numbers(&self.positions, &self.triangles);
-            let count = numbers.iter().max().map_or(0, |last| *last as usize + 1);
-            let mut pieces = vec![Vec::new(); count];
-            for (number, triangle) in numbers.iter().zip(&self.triangles) {
-                pieces[*number as usize].push(*triangle);
-            }
-            let area = |triangles: &[[u32; 3]]| area_m2(&self.positions, triangles);
-            let whole = area(&self.triangles);
-            let is_cut_off = |piece: &Vec<[u32; 3]>| {
-                (4..=PIECE_TRIANGLES).contains(&piece.len())
-                    && area(piece) >= SMALL_PIECE * whole
-                    && topology::is_convex(&self.positions, piece)
-            };
-            let cut_off: Vec<bool> = pieces.iter().map(is_cut_off).collect();
-            let cut_count = cut_off.iter().filter(|is_cut_off| **is_cut_off).count();
-            let rest: f64 = pieces.iter().zip(&cut_off).filter(|(_, cut)| !**cut).map(|(piece, _)| area(piece)).sum();
-            // What has nearly no area is no mesh of its own.
-            let last = if rest > 1e-6 * whole { cut_count as u32 } else { 0 };
-            if cut_count == 0 || cut_count >= PIECES_LIMIT {
-                return vec![0; numbers.len()];
-            }
-            let mut renumbered = vec![last; count];
-            let own = renumbered.iter_mut().zip(&cut_off).filter(|(_, is_cut_off)| **is_cut_off);
-            own.enumerate().for_each(|(number, (piece, _))| *piece = number as u32);
-            numbers.iter().map(|number| renumbered[*number as usize]).collect()
-        })
-    }
-
-    /// The corners of each triangle where the shape stands, and the piece to which it belongs.
-    pub fn corners(&self, place: DAffine3) -> impl Iterator<Item = (u32, [Vec3; 3])> {
+    /// The corners of each triangle where the shape stands.
+    pub fn corners(&self, place: DAffine3) -> impl Iterator<Item = [Vec3; 3]> {
         let (positions, _, triangles) = self.bent(place.matrix3, place.translation);
-        let corners = triangles.into_iter().map(move |triangle| triangle.map(|v| positions[v as usize]));
-        self.pieces().iter().copied().zip(corners)
-    }
-
-    pub fn piece_count(&self) -> u32 {
-        self.pieces().iter().max().map_or(1, |last| last + 1)
+        triangles.into_iter().map(move |triangle| triangle.map(|v| positions[v as usize]))
     }
 
     /// Positions, normals and triangles after a transformation; a mirrored surface keeps its outside.
@@ -232,6 +183,14 @@ impl Shape {
         }
         let at = |element: &u32, k: usize| if k < stored { numbers[*element as usize * stored + k] } else { 1.0 };
         Ok(Some(self.source.iter().flat_map(|element| (0..width).map(move |k| at(element, k))).collect()))
+    }
+
+    pub fn positions(&self) -> &[Vec3] {
+        &self.positions
+    }
+
+    pub fn triangles(&self) -> &[[u32; 3]] {
+        &self.triangles
     }
 
     pub fn triangle_count(&self) -> usize {
@@ -269,5 +228,5 @@ fn flat(place: String, positions: &[Vec3], triangles: &[[u32; 3]], attributes: H
     };
     let normals = apart.chunks_exact(3).flat_map(normal).collect();
     let triangles = (0..triangles.len() as u32).map(|t| [3 * t, 3 * t + 1, 3 * t + 2]).collect();
-    Shape { place, positions: apart, normals, triangles, source, attributes, pieces: OnceCell::new() }
+    Shape { place, positions: apart, normals, triangles, source, attributes }
 }

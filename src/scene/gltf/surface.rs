@@ -78,6 +78,11 @@ impl Surface {
         self.opacity == 1.0 && !self.has_alpha() && self.emission == Vec3::ZERO
     }
 
+    /// Whether it glows in one colour.
+    pub fn is_lamp(&self) -> bool {
+        self.emission != Vec3::ZERO && self.attributes.colors.is_none() && self.maps[2].is_none()
+    }
+
     /// The surface that a material gives a shape.
     pub fn new(
         document: &Document,

@@ -96,7 +96,7 @@ impl Textures {
         let texels = self.sampled(applied);
         let Some(uvs) = &applied.uvs else { return Ok(Glow::Even(texels.mean())) };
         let attributes = Attributes { uvs: applied.uvs.clone(), ..Default::default() };
-        let mesh = shape.mesh(&self.document, "", DMat3::IDENTITY, attributes, None)?;
+        let mesh = shape.mesh(&self.document, "", DMat3::IDENTITY, attributes, |_| true)?;
         if mesh.is_flat() {
             let wrap = applied.wrap;
             let texels = Some(texels);

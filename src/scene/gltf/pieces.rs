@@ -1,0 +1,154 @@
+//! Primitives that become several entities: tables as boards and legs, lamps as bulbs.
+
+use glam::Vec3;
+
+use super::join::{Candidate, halve};
+use crate::asset::mesh::area_m2;
+use crate::asset::topology;
+
+/// Most solids that a primitive is cut into.
+const SOLIDS_LIMIT: usize = 64;
+/// Most triangles of a solid that is cut off. Such a convex one has a closed form; others are as well off together, and
+/// each would take a second to bake.
+const SOLID_TRIANGLES: usize = 64;
+/// A solid of less than this share of the area stays with the rest.
+const SMALL_SOLID: f64 = 1e-3;
+
+/// Most lamps that a primitive is cut into; of more, neighbours are one.
+const LAMPS_LIMIT: usize = 32;
+/// Most pieces among which neighbours are found.
+const NEIGHBOURS_LIMIT: usize = 4096;
+/// A lamp is bent if it has less area than this share of the box around it: a ball has half of it, a ring of neon a
+/// fifth.
+const BENT: f32 = 0.25;
+/// Triangles of a bent lamp at least, and most halvings of it.
+const BENT_TRIANGLES: usize = 16;
+const HALVINGS: u32 = 4;
+
+/// Pieces of a surface: the numbers of their triangles.
+type Pieces = Vec<Vec<u32>>;
+
+/// The number of the piece that each triangle belongs to: convex solids, whose outlines hold up to where they touch, and
+/// last the rest. All are 0 where there is none, or too many are.
+pub fn solids(positions: &[Vec3], triangles: &[[u32; 3]]) -> Vec<u32> {
+    let pieces = loose(positions, triangles);
+    let area = |piece: &[u32]| area_m2(positions, &of(triangles, piece));
+    let whole = area_m2(positions, triangles);
+    let (cut_off, rest): (Pieces, Pieces) = pieces.into_iter().partition(|piece| {
+        (4..=SOLID_TRIANGLES).contains(&piece.len())
+            && area(piece) >= SMALL_SOLID * whole
+            && topology::is_convex(positions, &of(triangles, piece))
+    });
+    if cut_off.is_empty() || cut_off.len() >= SOLIDS_LIMIT {
+        return vec![0; triangles.len()];
+    }
+    // What has nearly no area is no mesh of its own.
+    let rest_m2: f64 = rest.iter().map(|piece| area(piece)).sum();
+    let last = if rest_m2 > 1e-6 * whole { cut_off.len() as u32 } else { 0 };
+    let mut numbers = vec![last; triangles.len()];
+    number(&mut numbers, &cut_off);
+    numbers
+}
+
+/// The number of the lamp that each triangle belongs to. A light of one outline is right from afar: each of the bulbs of
+/// a chandelier is a lamp, and so is each part of a ring that is bent.
+pub fn lamps(positions: &[Vec3], triangles: &[[u32; 3]]) -> Vec<u32> {
+    let mut pieces = loose(positions, triangles);
+    let mut numbers = vec![0; triangles.len()];
+    if pieces.len() > NEIGHBOURS_LIMIT {
+        return numbers;
+    }
+    join_touching(positions, triangles, &mut pieces);
+    let mut lamps = Vec::new();
+    if pieces.len() > LAMPS_LIMIT {
+        let size = pieces.len().div_ceil(LAMPS_LIMIT / 2);
+        let candidate = |(part, piece): (usize, &Vec<u32>)| {
+            let [low, high] = extent(positions, triangles, piece);
+            let centre = (low + high).as_dvec3() / 2.0;
+            Candidate { part, kind: (), centre, radius_m: 0.0, triangle_count: piece.len() }
+        };
+        let mut candidates: Vec<_> = pieces.iter().enumerate().map(candidate).collect();
+        let mut groups = Vec::new();
+        halve(&mut candidates, &mut groups, &|group| group.len() <= size);
+        lamps
+            .extend(groups.iter().map(|group| group.iter().flat_map(|part| pieces[*part].clone()).collect::<Vec<_>>()));
+    } else {
+        pieces.iter().for_each(|piece| unbend(positions, triangles, piece, HALVINGS, &mut lamps));
+    }
+    if lamps.len() <= LAMPS_LIMIT {
+        number(&mut numbers, &lamps);
+    } else {
+        number(&mut numbers, &pieces);
+    }
+    numbers
+}
+
+fn number(numbers: &mut [u32], pieces: &[Vec<u32>]) {
+    for (number, piece) in (0..).zip(pieces) {
+        piece.iter().for_each(|triangle| numbers[*triangle as usize] = number);
+    }
+}
+
+fn of(triangles: &[[u32; 3]], piece: &[u32]) -> Vec<[u32; 3]> {
+    piece.iter().map(|triangle| triangles[*triangle as usize]).collect()
+}
+
+/// Pieces that hang together.
+fn loose(positions: &[Vec3], triangles: &[[u32; 3]]) -> Pieces {
+    let numbers = topology::piece_numbers(positions, triangles);
+    let mut pieces = vec![Vec::new(); numbers.iter().max().map_or(0, |last| *last as usize + 1)];
+    (0..).zip(numbers).for_each(|(triangle, number)| pieces[number as usize].push(triangle));
+    pieces
+}
+
+/// The box around a piece.
+fn extent(positions: &[Vec3], triangles: &[[u32; 3]], piece: &[u32]) -> [Vec3; 2] {
+    let corners = || piece.iter().flat_map(|triangle| triangles[*triangle as usize]).map(|v| positions[v as usize]);
+    [corners().fold(Vec3::MAX, Vec3::min), corners().fold(Vec3::MIN, Vec3::max)]
+}
+
+/// Makes one of pieces whose boxes touch: a filament and its bulb, the six faces of a box.
+fn join_touching(positions: &[Vec3], triangles: &[[u32; 3]], pieces: &mut Pieces) {
+    let mut joined: Vec<(Vec<u32>, [Vec3; 2])> = Vec::new();
+    for mut piece in pieces.drain(..) {
+        let [low, high] = extent(positions, triangles, &piece);
+        let mut around = [low, high];
+        let touches = |around: [Vec3; 2], [low, high]: [Vec3; 2]| {
+            let slack = 1e-3 * (high - low).max_element();
+            around[0].cmple(high + slack).all() && low.cmple(around[1] + slack).all()
+        };
+        while let Some(other) = joined.iter().position(|(_, other)| touches(around, *other)) {
+            let (more, [low, high]) = joined.swap_remove(other);
+            piece.extend(more);
+            around = [around[0].min(low), around[1].max(high)];
+        }
+        joined.push((piece, around));
+    }
+    pieces.extend(joined.into_iter().map(|(mut piece, _)| {
+        piece.sort_unstable();
+        piece
+    }));
+    pieces.sort_unstable_by_key(|piece| piece[0]);
+}
+
+/// Cuts a bent piece in halves across its longest extent, and these again.
+fn unbend(positions: &[Vec3], triangles: &[[u32; 3]], piece: &[u32], halvings: u32, out: &mut Pieces) {
+    let own = of(triangles, piece);
+    let [low, high] = extent(positions, triangles, piece);
+    let size = high - low;
+    let box_m2 = 2.0 * (size.x * size.y + size.y * size.z + size.z * size.x);
+    let is_bent = piece.len() >= BENT_TRIANGLES
+        && (area_m2(positions, &own) as f32) < BENT * box_m2
+        && !topology::is_convex(positions, &own);
+    let axis = size.max_position();
+    let middle = 1.5 * (low + high)[axis];
+    let is_before = |triangle: &u32| {
+        triangles[*triangle as usize].map(|v| positions[v as usize][axis]).iter().sum::<f32>() < middle
+    };
+    let (before, behind): (Vec<u32>, Vec<u32>) = piece.iter().copied().partition(is_before);
+    if halvings == 0 || !is_bent || before.is_empty() || behind.is_empty() {
+        return out.push(piece.to_vec());
+    }
+    unbend(positions, triangles, &before, halvings - 1, out);
+    unbend(positions, triangles, &behind, halvings - 1, out);
+}

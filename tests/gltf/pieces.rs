@@ -4,8 +4,10 @@ use crate::common::{generate, joined};
 use crate::model::{Model, bench};
 use glam::{Mat3, Quat, Vec3};
 use serde_json::json;
+use shadow_fields::asset::Mesh;
 use shadow_fields::scene::gltf::{self, Import};
 use shadow_fields::scene::{LightMethod, Lights, Scene};
+use std::sync::Arc;
 
 fn load(model: &Model) -> (Import, Scene) {
     let folder = tempfile::tempdir().unwrap();
@@ -53,11 +55,71 @@ fn boxes_that_touch_are_pieces() {
 }
 
 #[test]
-fn lamps_and_what_lets_light_through_stay_whole() {
+fn what_lets_light_through_stays_whole() {
     let glass = json!({ "alphaMode": "BLEND", "pbrMetallicRoughness": { "baseColorFactor": [1, 1, 1, 0.3] } });
-    for material in [json!({ "emissiveFactor": [1, 1, 1] }), glass] {
-        assert_eq!(benches(&load(&bench(material.clone())).1), ["bench"], "{material}");
+    assert_eq!(benches(&load(&bench(glass)).1), ["bench"]);
+}
+
+/// The meshes of a file whose one primitive is of that material.
+fn meshes(parts: &[(&Mesh, Vec3)], material: serde_json::Value) -> Vec<Arc<Mesh>> {
+    let mut model = Model::default();
+    let material = model.push("materials", material);
+    let mesh = model.shape(&joined(parts), Some(material));
+    model.node(json!({ "mesh": mesh, "name": "one" }));
+    let (import, scene) = load(&model);
+    for (here, there) in import.meshes.iter().zip(&scene.meshes) {
+        assert_eq!(here.content_hash(), there.content_hash());
     }
+    let found = scene.entities.iter().filter(|entity| entity.name.starts_with("one"));
+    found.map(|entity| scene.meshes[entity.mesh].clone()).collect()
+}
+
+/// Bulbs that stand apart are lamps, up to 32; of more, neighbours are one. What touches is one lamp, and a ring of neon
+/// is cut into parts that are not bent.
+#[test]
+fn lamps_of_several_bulbs_are_several_lamps() {
+    let glow = || json!({ "emissiveFactor": [1, 1, 1] });
+    let bulb = generate::sphere(0.05, 2);
+    let row = |count: usize, step_m: f32| -> Vec<(&Mesh, Vec3)> {
+        (0..count).map(|i| (&bulb, i as f32 * step_m * Vec3::X)).collect()
+    };
+    let bulbs = meshes(&row(6, 0.4), glow());
+    assert_eq!(bulbs.len(), 6);
+    assert!(bulbs.iter().all(|mesh| mesh.ball_share().is_some()));
+    let many = meshes(&row(100, 0.4), glow());
+    assert!((16..=32).contains(&many.len()), "{}", many.len());
+    assert_eq!(many.iter().map(|mesh| mesh.triangles.len()).sum::<usize>(), 100 * bulb.triangles.len());
+    assert!(many.iter().all(|mesh| mesh.bounding_sphere().1 < 1.5), "neighbours");
+    let filament = generate::cuboid(Vec3::splat(0.02), 1);
+    assert_eq!(meshes(&[(&bulb, Vec3::ZERO), (&filament, Vec3::ZERO)], glow()).len(), 1);
+    assert_eq!(meshes(&row(4, 0.1), glow()).len(), 1, "they touch");
+
+    let ring = generate::torus(0.4, 0.02, 64, 8);
+    let parts = meshes(&[(&ring, Vec3::ZERO)], glow());
+    assert!((8..=16).contains(&parts.len()), "{}", parts.len());
+    assert!(parts.iter().all(|mesh| mesh.bounding_sphere().1 < 0.2));
+    assert_eq!(
+        meshes(&[(&generate::torus(0.4, 0.3, 64, 32), Vec3::ZERO)], glow()).len(),
+        1,
+        "a thick ring is not bent"
+    );
+}
+
+/// The walls of a room are rectangles of their own; a box that is open, seen from outside, is none.
+#[test]
+fn rooms_are_cut_into_their_walls() {
+    let solid = generate::cuboid(Vec3::new(4.0, 2.5, 3.0), 2);
+    let is_front = |t: &[u32; 3]| t.iter().all(|&v| solid.normals[v as usize].z > 0.5);
+    let open: Vec<[u32; 3]> = solid.triangles.iter().filter(|triangle| !is_front(triangle)).copied().collect();
+    let inwards: Vec<[u32; 3]> = open.iter().map(|[a, b, c]| [*a, *c, *b]).collect();
+    let normals: Vec<Vec3> = solid.normals.iter().map(|normal| -*normal).collect();
+    let shell = |normals: &[Vec3], triangles: Vec<[u32; 3]>| {
+        Mesh::new("shell", solid.positions.clone(), normals.to_vec(), None, triangles).unwrap()
+    };
+    let walls = meshes(&[(&shell(&normals, inwards), Vec3::ZERO)], json!({}));
+    assert_eq!(walls.len(), 5);
+    assert!(walls.iter().all(|mesh| mesh.rectangle().is_some()));
+    assert_eq!(meshes(&[(&shell(&solid.normals, open), Vec3::ZERO)], json!({})).len(), 1);
 }
 
 #[test]

@@ -354,18 +354,19 @@ fn double_sided_shapes_have_the_sides_that_are_seen() {
     for outwards in [false, true] {
         let (scene, notes) = model::scene(&study(outwards));
         assert_eq!(notes.left_out(), [""; 0]);
-        let mesh = |name: &str| {
-            let entity = scene.entities.iter().find(|entity| entity.name == name).unwrap();
-            &scene.meshes[entity.mesh]
+        let of = |name: &'static str| {
+            let entities = scene.entities.iter().filter(move |entity| entity.name.starts_with(name));
+            entities.map(|entity| &scene.meshes[entity.mesh])
         };
-        for (name, outwards) in [("room", false), ("crate", true), ("crate, inside out", true)] {
-            let mesh = mesh(name);
-            let (centre, _) = mesh.bounding_sphere();
-            let mut vertices = mesh.positions.iter().zip(&mesh.normals);
-            assert!(vertices.all(|(at, normal)| (normal.dot(*at - centre) > 0.0) == outwards), "{name}");
-            assert_eq!((mesh.is_solid(), mesh.triangles.len()), (outwards, 12), "{name}");
+        let faces = |mesh: &Mesh, middle: Vec3, outwards: bool| {
+            mesh.positions.iter().zip(&mesh.normals).all(|(at, normal)| (normal.dot(*at - middle) > 0.0) == outwards)
+        };
+        assert!(of("room").all(|mesh| faces(mesh, mesh.bounding_sphere().0, false) && mesh.triangles.len() == 12));
+        for mesh in of("crate") {
+            assert!(faces(mesh, mesh.bounding_sphere().0, true) && mesh.is_solid(), "{}", mesh.name);
         }
-        assert!(mesh("page").is_two_sided() && !mesh("picture").is_two_sided());
+        assert_eq!(of("crate").count(), 2);
+        assert!(of("page").all(|mesh| mesh.is_two_sided()) && !of("picture").any(|mesh| mesh.is_two_sided()));
     }
 
     // One side of the page is in the lamp's light.

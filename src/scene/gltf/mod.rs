@@ -11,6 +11,7 @@
 //! | animations of nodes | motion `node`, one for every moving node that carries the entity |
 //! | instances (`EXT_mesh_gpu_instancing`) | an entity each |
 //! | more than 2 048 primitives, or 1 023 meshes | small ones at rest are joined with neighbours of their material |
+//! | convex solids that are loose, walls of rooms, lamps that stand apart | entities of their own |
 //! | skins and morph targets | their shape at one time ([`Options::time_s`]) |
 //! | meshes compressed by Draco and meshoptimizer; KTX2 and WebP | as if they were not |
 //! | base colour factor | albedo |

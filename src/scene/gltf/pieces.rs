@@ -1,10 +1,12 @@
 //! Primitives that become several entities: tables as boards and legs, lamps as bulbs.
 
+use std::collections::HashSet;
+
 use glam::Vec3;
 
 use super::join::{Candidate, halve};
 use crate::asset::mesh::area_m2;
-use crate::asset::topology;
+use crate::asset::{Mesh, enclose, topology};
 
 /// Most solids that a primitive is cut into.
 const SOLIDS_LIMIT: usize = 64;
@@ -13,6 +15,15 @@ const SOLIDS_LIMIT: usize = 64;
 const SOLID_TRIANGLES: usize = 64;
 /// A solid of less than this share of the area stays with the rest.
 const SMALL_SOLID: f64 = 1e-3;
+
+/// Least area of a wall that is cut off, of its primitive's, and most walls of a piece.
+const WALL: f64 = 0.02;
+const WALLS_LIMIT: usize = 16;
+/// Least share of a room's area that is walls.
+const MOSTLY_WALLS: f64 = 0.5;
+/// Planes whose normals have this cosine at least, and that no corner leaves by more than this share of the piece, are one.
+const SAME_PLANE: f32 = 0.99999;
+const ON_PLANE: f32 = 1e-5;
 
 /// Most lamps that a primitive is cut into; of more, neighbours are one.
 const LAMPS_LIMIT: usize = 32;
@@ -28,23 +39,33 @@ const HALVINGS: u32 = 4;
 /// Pieces of a surface: the numbers of their triangles.
 type Pieces = Vec<Vec<u32>>;
 
-/// The number of the piece that each triangle belongs to: convex solids, whose outlines hold up to where they touch, and
-/// last the rest. All are 0 where there is none, or too many are.
+/// The number of the piece that each triangle belongs to: convex solids, whose outlines hold up to where they touch, the
+/// walls of rooms, and last the rest. All are 0 where there are no pieces, or too many.
 pub fn solids(positions: &[Vec3], triangles: &[[u32; 3]]) -> Vec<u32> {
     let pieces = loose(positions, triangles);
     let area = |piece: &[u32]| area_m2(positions, &of(triangles, piece));
     let whole = area_m2(positions, triangles);
-    let (cut_off, rest): (Pieces, Pieces) = pieces.into_iter().partition(|piece| {
+    let (mut cut_off, mut rest): (Pieces, Pieces) = pieces.into_iter().partition(|piece| {
         (4..=SOLID_TRIANGLES).contains(&piece.len())
             && area(piece) >= SMALL_SOLID * whole
             && topology::is_convex(positions, &of(triangles, piece))
     });
-    if cut_off.is_empty() || cut_off.len() >= SOLIDS_LIMIT {
-        return vec![0; triangles.len()];
+    let mut walls = Vec::new();
+    rest.iter_mut().for_each(|piece| cut_walls(positions, triangles, piece, WALL * whole, &mut walls));
+    // A single wall with nothing beside it is cut off from nothing.
+    if cut_off.len() + walls.len() < SOLIDS_LIMIT {
+        cut_off.extend(walls);
+    } else {
+        rest.extend(walls);
     }
     // What has nearly no area is no mesh of its own.
     let rest_m2: f64 = rest.iter().map(|piece| area(piece)).sum();
-    let last = if rest_m2 > 1e-6 * whole { cut_off.len() as u32 } else { 0 };
+    let has_rest = rest_m2 > 1e-6 * whole;
+    let count = cut_off.len() + usize::from(has_rest);
+    if !(2..=SOLIDS_LIMIT).contains(&count) {
+        return vec![0; triangles.len()];
+    }
+    let last = if has_rest { cut_off.len() as u32 } else { 0 };
     let mut numbers = vec![last; triangles.len()];
     number(&mut numbers, &cut_off);
     numbers
@@ -105,6 +126,53 @@ fn loose(positions: &[Vec3], triangles: &[[u32; 3]]) -> Pieces {
 fn extent(positions: &[Vec3], triangles: &[[u32; 3]], piece: &[u32]) -> [Vec3; 2] {
     let corners = || piece.iter().flat_map(|triangle| triangles[*triangle as usize]).map(|v| positions[v as usize]);
     [corners().fold(Vec3::MAX, Vec3::min), corners().fold(Vec3::MIN, Vec3::max)]
+}
+
+/// Takes the walls out of a room, the flat rectangles of an open piece that face its middle: each blocks in closed form,
+/// where the shell that they are part of has the coarse maps of its vertices. Walls of less than `least_m2` stay. A shell
+/// that is closed may be a solid that was wound inside out.
+fn cut_walls(positions: &[Vec3], triangles: &[[u32; 3]], piece: &mut Vec<u32>, least_m2: f64, walls: &mut Pieces) {
+    let own = of(triangles, piece);
+    let (centre, radius_m) = enclose::bounding_sphere(positions);
+    let inside_out: Vec<[u32; 3]> = own.iter().map(|[a, b, c]| [*a, *c, *b]).collect();
+    let is_closed = |triangles: &[[u32; 3]]| topology::shape(positions, triangles, centre, radius_m).closed;
+    if is_closed(&own) || is_closed(&inside_out) {
+        return;
+    }
+    let mut planes: Vec<(Vec3, f32, Vec<u32>)> = Vec::new();
+    for &triangle in piece.iter() {
+        let [a, b, c] = triangles[triangle as usize].map(|v| positions[v as usize] - centre);
+        let normal = (b - a).cross(c - a).normalize_or_zero();
+        let holds = |(along, offset, _): &(Vec3, f32, Vec<u32>)| {
+            along.dot(normal) > SAME_PLANE
+                && [a, b, c].iter().all(|corner| (along.dot(*corner) - offset).abs() < ON_PLANE * radius_m)
+        };
+        match planes.iter().position(holds) {
+            Some(plane) => planes[plane].2.push(triangle),
+            None if planes.len() == 4 * WALLS_LIMIT => return,
+            None => planes.push((normal, normal.dot(a), vec![triangle])),
+        }
+    }
+    let [low, high] = extent(positions, triangles, piece);
+    let middle = (low + high) / 2.0;
+    let is_wall = |wall: &Vec<u32>| {
+        let own = of(triangles, wall);
+        let [a, b, c] = own[0].map(|v| positions[v as usize]);
+        (b - a).cross(c - a).dot(middle - a) > 0.0
+            && area_m2(positions, &own) >= least_m2
+            && Mesh::new("", positions.to_vec(), Vec::new(), None, own).is_ok_and(|mesh| mesh.rectangle().is_some())
+    };
+    let parts = planes.iter().flat_map(|(.., plane)| {
+        let of_part = |part: Vec<u32>| part.iter().map(|number| plane[*number as usize]).collect();
+        loose(positions, &of(triangles, plane)).into_iter().map(of_part).collect::<Pieces>()
+    });
+    let found: Pieces = parts.filter(is_wall).collect();
+    let walls_m2: f64 = found.iter().map(|wall| area_m2(positions, &of(triangles, wall))).sum();
+    if (2..=WALLS_LIMIT).contains(&found.len()) && walls_m2 > MOSTLY_WALLS * area_m2(positions, &own) {
+        let taken: HashSet<u32> = found.iter().flatten().copied().collect();
+        piece.retain(|triangle| !taken.contains(triangle));
+        walls.extend(found);
+    }
 }
 
 /// Makes one of pieces whose boxes touch: a filament and its bulb, the six faces of a box.

@@ -381,7 +381,7 @@ bool may_block(uint packed, Surface surface) {
     }
 #if STATES
     uint state = light_states >> state_bit(chain_light(packed)) & 3;
-    if (state == OPEN || is_dark(packed) || (near_occluders & occluder_bit(packed & SKY_CHAIN)) == 0) {
+    if (state == OPEN || state == DARK || (near_occluders & occluder_bit(packed & SKY_CHAIN)) == 0) {
         return false;
     }
 #endif
@@ -414,8 +414,8 @@ uint next_entry(Surface surface, uint first, uint count, uint i, bool within) {
     do {
         uint packed = entry_at(first + i);
         bool ends = (packed & ENTRY_LIGHT) != 0;
-        bool is_skipped = is_dark(packed) || !has_own_outline(ENTITY(chain_light(packed)));
-        passes = ends ? !within && is_skipped : !may_block(packed, surface);
+        passes = ends ? !within && (is_dark(packed) || !has_own_outline(ENTITY(chain_light(packed))))
+                      : !may_block(packed, surface);
         i += passes ? 1 : 0;
     } while (passes && i < count);
 #endif

@@ -295,8 +295,12 @@ impl Mesh {
         }
     }
 
-    /// The mesh with the backs of its triangles as triangles of their own, which are lit by themselves.
+    /// The mesh with the backs of its triangles as triangles of their own, which are lit by themselves. It is closed no
+    /// more: what is within sees it too.
     pub(crate) fn with_backs(mut self) -> Self {
+        if self.is_closed() {
+            self = self.opened();
+        }
         let count = self.positions.len() as u32;
         self.positions.extend_from_within(..);
         self.normals.extend_from_within(..);

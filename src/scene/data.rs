@@ -326,8 +326,8 @@ pub struct MeshData {
     pub file: Option<PathBuf>,
     /// Mesh and primitive of a glTF file, counted from 0.
     pub part: Option<[usize; 2]>,
-    /// One of the loose pieces of the part, counted from 0: convex solids of few triangles, and last the rest. The default
-    /// takes all.
+    /// One of the pieces of the part, counted from 0: loose convex solids of few triangles, walls of rooms, and last the
+    /// rest; of what glows, lamps that stand apart. The default takes all.
     pub piece: Option<u32>,
     /// Columns of a matrix that scales, mirrors or shears the part. The default leaves it as it is.
     pub bend: Option<[f64; 9]>,

@@ -120,6 +120,10 @@ fn rooms_are_cut_into_their_walls() {
     assert_eq!(walls.len(), 5);
     assert!(walls.iter().all(|mesh| mesh.rectangle().is_some()));
     assert_eq!(meshes(&[(&shell(&solid.normals, open), Vec3::ZERO)], json!({})).len(), 1);
+    let closed: Vec<[u32; 3]> = solid.triangles.iter().map(|[a, b, c]| [*a, *c, *b]).collect();
+    let ring = generate::torus(0.4, 0.1, 24, 12);
+    let both = meshes(&[(&shell(&normals, closed), Vec3::ZERO), (&ring, 9.0 * Vec3::X)], json!({}));
+    assert_eq!(both.len(), 1, "a box that may be inside out");
 }
 
 #[test]

@@ -27,7 +27,8 @@ const AROUND_DEG: [f32; 2] = [15.0, 45.0];
 const LEAST_COSINE: f32 = 0.1;
 /// Least share of looks that end at backs, of solids and of other shapes: what reaches into a solid sees its backs.
 const LEAST_BACKS: [f64; 2] = [0.6, 0.1];
-/// From this share on, the surface was wound inside out.
+/// From this share on, the surface was wound inside out, if anything within the scene sees it: from around a room all
+/// sees its outside.
 const INSIDE_OUT: f64 = 0.95;
 /// Radius of the scene in the units of the hierarchy, which leaves out boxes that a ray has left 1e-4 after its start.
 const RADIUS: f32 = 1024.0;
@@ -60,7 +61,9 @@ pub struct Onlookers {
     indices: HashMap<[usize; 2], Vec<u32>>,
     /// Places on surfaces, and the primitive of each.
     places: Vec<(Vec3A, [usize; 2])>,
+    /// Cameras of the scene, or places around it where it has none.
     cameras: Vec<Vec3A>,
+    has_cameras: bool,
 }
 
 impl Onlookers {
@@ -92,6 +95,7 @@ impl Onlookers {
         });
         Onlookers {
             places: places.map(|(place, triangle)| (place, owners[triangle as usize].primitive)).collect(),
+            has_cameras: !cameras.is_empty(),
             cameras: if cameras.is_empty() { around.collect() } else { cameras.iter().map(|at| local(*at)).collect() },
             hierarchy,
             triangles,
@@ -112,23 +116,26 @@ impl Onlookers {
         let others: Vec<Vec3A> = self.places.iter().filter(|(_, of)| *of != primitive).map(|(at, _)| *at).collect();
         let mut fronts = 0;
         let mut backs = 0;
-        for (from, looks) in [&others, &self.cameras].into_iter().zip(LOOKS) {
+        let mut from_scene = 0;
+        let viewers = [(&others, true), (&self.cameras, self.has_cameras)];
+        for ((from, is_of_scene), looks) in viewers.into_iter().zip(LOOKS) {
             for look in 0..if from.is_empty() { 0 } else { looks } {
                 // Places and targets in orders that have nothing to do with each other.
                 let (target, _) = area.place(&self.triangles, golden(look), look);
                 let eye = from[look * from.len().max(looks) / looks % from.len()];
-                match self.seen(eye, target, &owns) {
-                    Some(true) => backs += 1,
-                    Some(false) => fronts += 1,
-                    None => {}
-                }
+                let Some(is_back) = self.seen(eye, target, &owns) else { continue };
+                backs += u32::from(is_back);
+                fronts += u32::from(!is_back);
+                from_scene += u32::from(is_of_scene);
             }
         }
-        let share = f64::from(backs) / f64::from(backs + fronts);
-        match share {
-            _ if backs == 0 || share < LEAST_BACKS[usize::from(!is_solid)] => Sides::Front,
-            _ if share >= INSIDE_OUT => Sides::Back,
-            _ => Sides::Both,
+        let share = f64::from(backs) / f64::from((backs + fronts).max(1));
+        if share < LEAST_BACKS[usize::from(!is_solid)] {
+            Sides::Front
+        } else if share >= INSIDE_OUT && from_scene > 0 {
+            Sides::Back
+        } else {
+            Sides::Both
         }
     }
 

@@ -235,6 +235,8 @@ pub(super) struct Reader {
     primitives: HashMap<PartKey, Option<Rc<Primitive>>>,
     /// What sees the backs of surfaces; `None` within for a scene that is too large.
     onlookers: Option<Option<Rc<Onlookers>>>,
+    /// What they have seen of parts, solids and others.
+    sides: HashMap<(PartKey, Option<u32>, bool), Sides>,
     triangle_count: usize,
     notes: Notes,
 }
@@ -248,6 +250,7 @@ impl Reader {
             stage: None,
             primitives: HashMap::new(),
             onlookers: None,
+            sides: HashMap::new(),
             triangle_count: 0,
             notes: Notes::default(),
         }
@@ -318,21 +321,32 @@ impl Reader {
         self.triangle_count += mesh.triangles.len();
         join::check_triangles(&self.document, &primitive.shape, self.triangle_count)?;
         let surface = &primitive.surface;
-        if !surface.is_double_sided || surface.has_alpha() && mesh.is_closed() {
+        if surface.has_backs {
+            return Ok(if mesh.is_closed() { mesh } else { mesh.with_backs() });
+        }
+        if !surface.is_double_sided || !surface.is_solid() {
             return Ok(mesh);
         }
-        if surface.has_alpha() {
-            return Ok(mesh.with_backs());
+        let sides: Vec<Sides> = parts.iter().map(|part| self.sides(*part, mesh.is_solid())).collect::<Result<_>>()?;
+        if sides.iter().all(|sides| *sides == Sides::Front) {
+            Ok(mesh)
+        } else if sides.iter().all(|sides| *sides == Sides::Back) {
+            mesh.turned_over()
+        } else {
+            Ok(mesh.with_backs())
         }
-        let Some(onlookers) = self.onlookers()?.filter(|_| surface.is_solid()) else { return Ok(mesh) };
-        let of = |part: &Part| onlookers.sides([part.mesh, part.at], part.piece, mesh.is_solid());
-        let sides: Vec<Sides> = parts.iter().map(of).collect();
-        match sides[0] {
-            first if sides.iter().any(|other| *other != first) => Ok(mesh.with_backs()),
-            Sides::Front => Ok(mesh),
-            Sides::Both => Ok(mesh.with_backs()),
-            Sides::Back => mesh.turned_over(),
+    }
+
+    /// The sides of a part that are seen. A pose is not looked at.
+    fn sides(&mut self, part: Part, is_solid: bool) -> Result<Sides> {
+        let key = (part.key(), part.piece, is_solid);
+        if let Some(known) = self.sides.get(&key) {
+            return Ok(*known);
         }
+        let onlookers = self.onlookers()?.filter(|_| part.pose.is_none());
+        let sides = onlookers.map_or(Sides::Front, |all| all.sides([part.mesh, part.at], part.piece, is_solid));
+        self.sides.insert(key, sides);
+        Ok(sides)
     }
 
     /// What sees the backs of surfaces, found once; `None` for a scene that is too large.
@@ -346,19 +360,27 @@ impl Reader {
         for stand in &stage.stands {
             let node = &document.root.nodes[stand.node];
             let Some(mesh) = node.mesh.map(|mesh| mesh.value()) else { continue };
+            if pose::is_posed(&document, stand.node, stage.tracks[stand.node].as_ref()) {
+                continue;
+            }
             for at in 0..document.root.meshes[mesh].primitives.len() {
-                // Skins are looked at as they are stored: a pose turns nothing inside out.
-                let Some(primitive) = self.primitive(Part { mesh, at, pose: None, piece: None })? else { continue };
-                let is_opaque = primitive.surface.opacity == 1.0 && !primitive.surface.has_alpha();
-                let owner = |piece| Owner { primitive: [mesh, at], piece };
-                let place = if node.skin.is_some() { DAffine3::IDENTITY } else { stand.rest };
-                if is_opaque {
-                    let corners = primitive.shape.corners(place);
-                    surfaces.extend(primitive.pieces().iter().zip(corners).map(|(piece, of)| (owner(*piece), of)));
+                // A primitive that cannot be read is refused where it is wanted.
+                let part = Part { mesh, at, pose: None, piece: None };
+                let Ok(Some(primitive)) = self.primitive(part) else { continue };
+                if primitive.surface.opacity < 1.0 || primitive.surface.has_alpha() {
+                    continue;
                 }
+                if surfaces.len() + primitive.shape.triangle_count() > backs::TRIANGLES_LIMIT {
+                    return Ok(self.onlookers.insert(None).clone());
+                }
+                let corners = primitive.shape.corners(stand.rest);
+                let owners = primitive.pieces().iter().map(|piece| Owner { primitive: [mesh, at], piece: *piece });
+                // Others are refused as well.
+                let is_in_range = |corner: &Vec3| corner.abs().cmple(Vec3::splat(POSITION_LIMIT_M)).all();
+                surfaces.extend(owners.zip(corners).filter(|(_, corners)| corners.iter().all(is_in_range)));
             }
         }
-        if surfaces.is_empty() || surfaces.len() > backs::TRIANGLES_LIMIT {
+        if surfaces.is_empty() {
             return Ok(self.onlookers.insert(None).clone());
         }
         let is_camera = |stand: &&Stand| document.root.nodes[stand.node].camera.is_some();
@@ -504,12 +526,12 @@ impl Builder {
             entities = self.joined(&mut parts)?;
         }
         let counts: Vec<u32> = parts.iter().map(|part| self.piece_count(part)).collect::<Result<_>>()?;
-        let cut_count: u32 = counts.iter().filter(|count| **count > 1).sum();
-        let is_whole = cut_count > PIECES_LIMIT || meshes.len() + cut_count as usize > MESHES_LIMIT;
+        let mut left = PIECES_LIMIT.min((MESHES_LIMIT - meshes.len().min(MESHES_LIMIT)) as u32);
         for (placed, count) in parts.iter().zip(counts) {
-            if count == 1 || is_whole {
+            if count == 1 || count > left {
                 entities.extend(self.entity(&placed.stand, placed.part)?);
             } else {
+                left -= count;
                 for piece in 0..count {
                     entities.extend(self.entity(&placed.stand, Part { piece: Some(piece), ..placed.part })?);
                 }

@@ -2,7 +2,7 @@
 
 use std::collections::HashSet;
 
-use glam::Vec3;
+use glam::{Mat3, Vec3};
 
 use super::join::{Candidate, halve};
 use crate::asset::mesh::area_m2;
@@ -29,9 +29,10 @@ const ON_PLANE: f32 = 1e-5;
 const LAMPS_LIMIT: usize = 32;
 /// Most pieces among which neighbours are found.
 const NEIGHBOURS_LIMIT: usize = 4096;
-/// A lamp is bent if it has less area than this share of the box around it: a ball has half of it, a ring of neon a
-/// fifth.
-const BENT: f32 = 0.25;
+/// A lamp is bent if it is thin, of less area than this share of its length's square, and fills less of the box along its
+/// axes than this: a straight tube has 0.8 of the box's area, a ring of neon 0.2, an eighth of it 0.54.
+const THIN: f32 = 0.5;
+const BENT: f32 = 0.6;
 /// Triangles of a bent lamp at least, and most halvings of it.
 const BENT_TRIANGLES: usize = 16;
 const HALVINGS: u32 = 4;
@@ -52,7 +53,6 @@ pub fn solids(positions: &[Vec3], triangles: &[[u32; 3]]) -> Vec<u32> {
     });
     let mut walls = Vec::new();
     rest.iter_mut().for_each(|piece| cut_walls(positions, triangles, piece, WALL * whole, &mut walls));
-    // A single wall with nothing beside it is cut off from nothing.
     if cut_off.len() + walls.len() < SOLIDS_LIMIT {
         cut_off.extend(walls);
     } else {
@@ -80,6 +80,9 @@ pub fn lamps(positions: &[Vec3], triangles: &[[u32; 3]]) -> Vec<u32> {
         return numbers;
     }
     join_touching(positions, triangles, &mut pieces);
+    // What has nearly no area is no mesh of its own.
+    let whole = area_m2(positions, triangles);
+    pieces.retain(|piece| area_m2(positions, &of(triangles, piece)) > 1e-6 * whole);
     let mut lamps = Vec::new();
     if pieces.len() > LAMPS_LIMIT {
         let size = pieces.len().div_ceil(LAMPS_LIMIT / 2);
@@ -133,19 +136,20 @@ fn extent(positions: &[Vec3], triangles: &[[u32; 3]], piece: &[u32]) -> [Vec3; 2
 /// that is closed may be a solid that was wound inside out.
 fn cut_walls(positions: &[Vec3], triangles: &[[u32; 3]], piece: &mut Vec<u32>, least_m2: f64, walls: &mut Pieces) {
     let own = of(triangles, piece);
-    let (centre, radius_m) = enclose::bounding_sphere(positions);
-    let inside_out: Vec<[u32; 3]> = own.iter().map(|[a, b, c]| [*a, *c, *b]).collect();
-    let is_closed = |triangles: &[[u32; 3]]| topology::shape(positions, triangles, centre, radius_m).closed;
-    if is_closed(&own) || is_closed(&inside_out) {
+    let area = area_m2(positions, &own);
+    if area < 2.0 * least_m2 {
         return;
     }
+    let [low, high] = extent(positions, triangles, piece);
+    let middle = (low + high) / 2.0;
+    let off_plane_m = ON_PLANE * low.distance(high);
     let mut planes: Vec<(Vec3, f32, Vec<u32>)> = Vec::new();
     for &triangle in piece.iter() {
-        let [a, b, c] = triangles[triangle as usize].map(|v| positions[v as usize] - centre);
-        let normal = (b - a).cross(c - a).normalize_or_zero();
+        let [a, b, c] = triangles[triangle as usize].map(|v| positions[v as usize] - middle);
+        let Some(normal) = (b - a).cross(c - a).try_normalize() else { continue };
         let holds = |(along, offset, _): &(Vec3, f32, Vec<u32>)| {
             along.dot(normal) > SAME_PLANE
-                && [a, b, c].iter().all(|corner| (along.dot(*corner) - offset).abs() < ON_PLANE * radius_m)
+                && [a, b, c].iter().all(|corner| (along.dot(*corner) - offset).abs() < off_plane_m)
         };
         match planes.iter().position(holds) {
             Some(plane) => planes[plane].2.push(triangle),
@@ -153,26 +157,45 @@ fn cut_walls(positions: &[Vec3], triangles: &[[u32; 3]], piece: &mut Vec<u32>, l
             None => planes.push((normal, normal.dot(a), vec![triangle])),
         }
     }
-    let [low, high] = extent(positions, triangles, piece);
-    let middle = (low + high) / 2.0;
-    let is_wall = |wall: &Vec<u32>| {
-        let own = of(triangles, wall);
-        let [a, b, c] = own[0].map(|v| positions[v as usize]);
-        (b - a).cross(c - a).dot(middle - a) > 0.0
-            && area_m2(positions, &own) >= least_m2
-            && Mesh::new("", positions.to_vec(), Vec::new(), None, own).is_ok_and(|mesh| mesh.rectangle().is_some())
-    };
-    let parts = planes.iter().flat_map(|(.., plane)| {
-        let of_part = |part: Vec<u32>| part.iter().map(|number| plane[*number as usize]).collect();
-        loose(positions, &of(triangles, plane)).into_iter().map(of_part).collect::<Pieces>()
-    });
-    let found: Pieces = parts.filter(is_wall).collect();
-    let walls_m2: f64 = found.iter().map(|wall| area_m2(positions, &of(triangles, wall))).sum();
-    if (2..=WALLS_LIMIT).contains(&found.len()) && walls_m2 > MOSTLY_WALLS * area_m2(positions, &own) {
+    let mut found = Vec::new();
+    let mut walls_m2 = 0.0;
+    for (_, offset, plane) in planes {
+        let plane_m2 = area_m2(positions, &of(triangles, &plane));
+        if offset >= 0.0 || plane_m2 < least_m2 {
+            continue;
+        }
+        let (corners, own) = compact(positions, &of(triangles, &plane));
+        for part in loose(&corners, &own) {
+            let Ok(wall) = Mesh::new("", corners.clone(), Vec::new(), None, of(&own, &part)) else { continue };
+            if wall.rectangle().is_some() && wall.area_m2() >= least_m2 {
+                walls_m2 += wall.area_m2();
+                found.push(part.iter().map(|number| plane[*number as usize]).collect::<Vec<u32>>());
+            }
+        }
+    }
+    if (2..=WALLS_LIMIT).contains(&found.len()) && walls_m2 > MOSTLY_WALLS * area && !is_closed(positions, &own) {
         let taken: HashSet<u32> = found.iter().flatten().copied().collect();
         piece.retain(|triangle| !taken.contains(triangle));
         walls.extend(found);
     }
+}
+
+/// Whether a piece has no border, however it is wound.
+fn is_closed(positions: &[Vec3], piece: &[[u32; 3]]) -> bool {
+    let (positions, triangles) = compact(positions, piece);
+    let (centre, radius_m) = enclose::bounding_sphere(&positions);
+    let turned_over: Vec<[u32; 3]> = triangles.iter().map(|[a, b, c]| [*a, *c, *b]).collect();
+    [triangles, turned_over].iter().any(|of| topology::shape(&positions, of, centre, radius_m).closed)
+}
+
+/// The triangles with only the positions that they have.
+fn compact(positions: &[Vec3], triangles: &[[u32; 3]]) -> (Vec<Vec3>, Vec<[u32; 3]>) {
+    let mut used: Vec<u32> = triangles.iter().flatten().copied().collect();
+    used.sort_unstable();
+    used.dedup();
+    let number = |v: u32| used.partition_point(|other| *other < v) as u32;
+    let triangles = triangles.iter().map(|triangle| triangle.map(number)).collect();
+    (used.iter().map(|v| positions[*v as usize]).collect(), triangles)
 }
 
 /// Makes one of pieces whose boxes touch: a filament and its bulb, the six faces of a box.
@@ -181,12 +204,15 @@ fn join_touching(positions: &[Vec3], triangles: &[[u32; 3]], pieces: &mut Pieces
     for mut piece in pieces.drain(..) {
         let [low, high] = extent(positions, triangles, &piece);
         let mut around = [low, high];
-        let touches = |around: [Vec3; 2], [low, high]: [Vec3; 2]| {
-            let slack = 1e-3 * (high - low).max_element();
-            around[0].cmple(high + slack).all() && low.cmple(around[1] + slack).all()
+        let touches = |[low, high]: [Vec3; 2], other: [Vec3; 2]| {
+            let slack = 1e-3 * (high - low).max(other[1] - other[0]).max_element();
+            low.cmple(other[1] + slack).all() && other[0].cmple(high + slack).all()
         };
         while let Some(other) = joined.iter().position(|(_, other)| touches(around, *other)) {
-            let (more, [low, high]) = joined.swap_remove(other);
+            let (mut more, [low, high]) = joined.swap_remove(other);
+            if more.len() > piece.len() {
+                std::mem::swap(&mut more, &mut piece);
+            }
             piece.extend(more);
             around = [around[0].min(low), around[1].max(high)];
         }
@@ -202,21 +228,32 @@ fn join_touching(positions: &[Vec3], triangles: &[[u32; 3]], pieces: &mut Pieces
 /// Cuts a bent piece in halves across its longest extent, and these again.
 fn unbend(positions: &[Vec3], triangles: &[[u32; 3]], piece: &[u32], halvings: u32, out: &mut Pieces) {
     let own = of(triangles, piece);
-    let [low, high] = extent(positions, triangles, piece);
-    let size = high - low;
+    let axes = own_axes(positions, &own);
+    let along = |triangle: &[u32; 3]| triangle.map(|v| axes.transpose() * positions[v as usize]);
+    let corners = || own.iter().flat_map(along);
+    let low = corners().fold(Vec3::MAX, Vec3::min);
+    let size = corners().fold(Vec3::MIN, Vec3::max) - low;
     let box_m2 = 2.0 * (size.x * size.y + size.y * size.z + size.z * size.x);
-    let is_bent = piece.len() >= BENT_TRIANGLES
-        && (area_m2(positions, &own) as f32) < BENT * box_m2
-        && !topology::is_convex(positions, &own);
-    let axis = size.max_position();
-    let middle = 1.5 * (low + high)[axis];
-    let is_before = |triangle: &u32| {
-        triangles[*triangle as usize].map(|v| positions[v as usize][axis]).iter().sum::<f32>() < middle
-    };
+    let area = area_m2(positions, &own) as f32;
+    let is_bent = piece.len() >= BENT_TRIANGLES && area < THIN * size.x * size.x && area < BENT * box_m2;
+    let middle = 3.0 * (low.x + 0.5 * size.x);
+    let is_before = |triangle: &u32| along(&triangles[*triangle as usize]).iter().map(|at| at.x).sum::<f32>() < middle;
     let (before, behind): (Vec<u32>, Vec<u32>) = piece.iter().copied().partition(is_before);
     if halvings == 0 || !is_bent || before.is_empty() || behind.is_empty() {
         return out.push(piece.to_vec());
     }
     unbend(positions, triangles, &before, halvings - 1, out);
     unbend(positions, triangles, &behind, halvings - 1, out);
+}
+
+/// Axes of a piece, from its longest extent to its shortest.
+fn own_axes(positions: &[Vec3], piece: &[[u32; 3]]) -> Mat3 {
+    let corners = || piece.iter().flatten().map(|v| positions[*v as usize]);
+    let farthest = |from: Vec3| corners().max_by(|a, b| a.distance(from).total_cmp(&b.distance(from))).unwrap_or(from);
+    let end = farthest(positions[piece[0][0] as usize]);
+    let x = (farthest(end) - end).normalize_or(Vec3::X);
+    let across = |corner: Vec3| (corner - end).reject_from_normalized(x);
+    let y = corners().map(across).max_by(|a, b| a.length().total_cmp(&b.length())).unwrap_or_default();
+    let y = y.try_normalize().unwrap_or_else(|| x.any_orthonormal_vector());
+    Mat3::from_cols(x, y, x.cross(y))
 }

@@ -54,6 +54,8 @@ pub struct Surface {
     /// How it reflects besides; an unlit surface does not.
     pub gloss: Option<Gloss>,
     pub is_double_sided: bool,
+    /// Whether an open shape that this covers has two sides in any case: it is cut out by a texture, as leaves are.
+    pub has_backs: bool,
     /// Share of light that does not pass; a texture may be another factor.
     pub opacity: f32,
     /// Its textures for that: gloss, normal and emission.
@@ -80,7 +82,8 @@ impl Surface {
 
     /// Whether it glows in one colour.
     pub fn is_lamp(&self) -> bool {
-        self.emission != Vec3::ZERO && self.attributes.colors.is_none() && self.maps[2].is_none()
+        let is_even = self.attributes.colors.is_none() && self.maps[2].is_none();
+        self.emission != Vec3::ZERO && is_even && self.opacity == 1.0 && !self.has_alpha()
     }
 
     /// The surface that a material gives a shape.
@@ -124,6 +127,7 @@ impl Surface {
         let alpha_cutoff = matches!(json.alpha_mode, Checked::Valid(AlphaMode::Mask))
             .then(|| (json.alpha_cutoff.map_or(0.5, |cutoff| cutoff.0) / alpha.max(1e-6)).clamp(0.0, 1.0));
         let alpha_blend = matches!(json.alpha_mode, Checked::Valid(AlphaMode::Blend));
+        let has_backs = json.double_sided && base.is_some() && (alpha_blend || alpha_cutoff.is_some());
         let paint = (base.is_some() || attributes.tints.is_some()).then(|| Paint {
             image: base.as_ref().map(|base| base.image),
             texture: Texture {
@@ -171,6 +175,7 @@ impl Surface {
             paint,
             gloss,
             is_double_sided: json.double_sided,
+            has_backs,
             opacity,
             maps,
             normal_scale,

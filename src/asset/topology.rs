@@ -59,12 +59,29 @@ pub fn shape(positions: &[Vec3], triangles: &[[u32; 3]], centre: Vec3, radius_m:
     Topology { closed, solid, convex, plane: plane(positions, f64::from(radius_m)), euler_characteristic }
 }
 
+/// A few triangles of many by themselves: the positions of their corners, three a triangle.
+pub fn apart(positions: &[Vec3], triangles: &[[u32; 3]]) -> (Vec<Vec3>, Vec<[u32; 3]>) {
+    let corners = triangles.iter().flatten().map(|v| positions[*v as usize]).collect();
+    (corners, (0..triangles.len() as u32).map(|t| [3 * t, 3 * t + 1, 3 * t + 2]).collect())
+}
+
+/// Classifies a few triangles of many.
+fn shape_of_part(positions: &[Vec3], triangles: &[[u32; 3]]) -> Option<Topology> {
+    let (corners, apart) = apart(positions, triangles);
+    let (centre, radius_m) = enclose::bounding_sphere(&corners);
+    (radius_m > 0.0).then(|| shape(&corners, &apart, centre, radius_m))
+}
+
 /// Whether a few triangles of many are a convex solid.
 pub fn is_convex(positions: &[Vec3], triangles: &[[u32; 3]]) -> bool {
-    let corners: Vec<Vec3> = triangles.iter().flatten().map(|v| positions[*v as usize]).collect();
-    let (centre, radius_m) = enclose::bounding_sphere(&corners);
-    let apart: Vec<[u32; 3]> = (0..triangles.len() as u32).map(|t| [3 * t, 3 * t + 1, 3 * t + 2]).collect();
-    radius_m > 0.0 && shape(&corners, &apart, centre, radius_m).convex
+    shape_of_part(positions, triangles).is_some_and(|shape| shape.convex)
+}
+
+/// Whether a few triangles of many are closed, outwards or inside out.
+pub fn is_closed_either_way(positions: &[Vec3], triangles: &[[u32; 3]]) -> bool {
+    let inside_out: Vec<[u32; 3]> = triangles.iter().map(|[a, b, c]| [*a, *c, *b]).collect();
+    let is_closed = |of: &[[u32; 3]]| shape_of_part(positions, of).is_some_and(|shape| shape.closed);
+    is_closed(triangles) || is_closed(&inside_out)
 }
 
 /// Signed volume in cubic metres: the sum of the tetrahedra from `centre` to every triangle.

@@ -6,7 +6,7 @@ use glam::{Mat3, Vec3};
 
 use super::join::{Candidate, halve};
 use crate::asset::mesh::area_m2;
-use crate::asset::{Mesh, enclose, topology};
+use crate::asset::{Mesh, topology};
 
 /// Most solids that a primitive is cut into.
 const SOLIDS_LIMIT: usize = 64;
@@ -160,11 +160,11 @@ fn cut_walls(positions: &[Vec3], triangles: &[[u32; 3]], piece: &mut Vec<u32>, l
     let mut found = Vec::new();
     let mut walls_m2 = 0.0;
     for (_, offset, plane) in planes {
-        let plane_m2 = area_m2(positions, &of(triangles, &plane));
-        if offset >= 0.0 || plane_m2 < least_m2 {
+        let own = of(triangles, &plane);
+        if offset >= 0.0 || area_m2(positions, &own) < least_m2 {
             continue;
         }
-        let (corners, own) = compact(positions, &of(triangles, &plane));
+        let (corners, own) = topology::apart(positions, &own);
         for part in loose(&corners, &own) {
             let Ok(wall) = Mesh::new("", corners.clone(), Vec::new(), None, of(&own, &part)) else { continue };
             if wall.rectangle().is_some() && wall.area_m2() >= least_m2 {
@@ -173,29 +173,14 @@ fn cut_walls(positions: &[Vec3], triangles: &[[u32; 3]], piece: &mut Vec<u32>, l
             }
         }
     }
-    if (2..=WALLS_LIMIT).contains(&found.len()) && walls_m2 > MOSTLY_WALLS * area && !is_closed(positions, &own) {
+    if (2..=WALLS_LIMIT).contains(&found.len())
+        && walls_m2 > MOSTLY_WALLS * area
+        && !topology::is_closed_either_way(positions, &own)
+    {
         let taken: HashSet<u32> = found.iter().flatten().copied().collect();
         piece.retain(|triangle| !taken.contains(triangle));
         walls.extend(found);
     }
-}
-
-/// Whether a piece has no border, however it is wound.
-fn is_closed(positions: &[Vec3], piece: &[[u32; 3]]) -> bool {
-    let (positions, triangles) = compact(positions, piece);
-    let (centre, radius_m) = enclose::bounding_sphere(&positions);
-    let turned_over: Vec<[u32; 3]> = triangles.iter().map(|[a, b, c]| [*a, *c, *b]).collect();
-    [triangles, turned_over].iter().any(|of| topology::shape(&positions, of, centre, radius_m).closed)
-}
-
-/// The triangles with only the positions that they have.
-fn compact(positions: &[Vec3], triangles: &[[u32; 3]]) -> (Vec<Vec3>, Vec<[u32; 3]>) {
-    let mut used: Vec<u32> = triangles.iter().flatten().copied().collect();
-    used.sort_unstable();
-    used.dedup();
-    let number = |v: u32| used.partition_point(|other| *other < v) as u32;
-    let triangles = triangles.iter().map(|triangle| triangle.map(number)).collect();
-    (used.iter().map(|v| positions[*v as usize]).collect(), triangles)
 }
 
 /// Makes one of pieces whose boxes touch: a filament and its bulb, the six faces of a box.

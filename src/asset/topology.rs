@@ -26,6 +26,10 @@ const FLAT_TOLERANCE: f64 = 1e-5;
 /// files.
 const VERTEX_NOISE: f64 = 5e-7;
 
+/// Depth of the dents that a convex body may have, relative to its bounding radius or, where that is more, to the farthest
+/// coordinate: the balls that modelling programs make have dents of 6e-7.
+const DENT: f64 = 2e-6;
+
 /// Steps of a full turn in which sides around an edge are told apart.
 const ANGLE_STEPS: f64 = 4096.0;
 
@@ -52,10 +56,11 @@ pub fn shape(positions: &[Vec3], triangles: &[[u32; 3]], centre: Vec3, radius_m:
         && fan_count(&edges, corners.len()) == vertex_count
         && volume_m3(positions, triangles, centre) > VERTEX_NOISE * f64::from(radius_m).powi(3);
     let solid = closed && has_solid_pieces(&edges, positions, triangles, centre);
+    let farthest = positions.iter().fold(radius_m, |most, p| most.max(p.abs().max_element()));
     let convex = closed
         && euler_characteristic == 2
         && pieces(&edges, triangles.len()).count == 1
-        && edges.iter().all(|e| bends_outwards(e, positions, triangles, f64::from(radius_m)));
+        && edges.iter().all(|e| bends_outwards(e, positions, triangles, DENT * f64::from(farthest)));
     Topology { closed, solid, convex, plane: plane(positions, f64::from(radius_m)), euler_characteristic }
 }
 
@@ -267,7 +272,7 @@ impl Sets {
 /// Whether the far corner of the edge's second triangle lies below the plane of the first, or above it by no more than
 /// rounding explains. Rounding tilts the first plane, so its effect grows with the ratio of the two corners' distances
 /// from the edge.
-fn bends_outwards(edge: &[HalfEdge], positions: &[Vec3], triangles: &[[u32; 3]], radius_m: f64) -> bool {
+fn bends_outwards(edge: &[HalfEdge], positions: &[Vec3], triangles: &[[u32; 3]], dent_m: f64) -> bool {
     let at = |corner: usize| positions[triangles[corner / 3][corner % 3] as usize].as_dvec3();
     let one = edge[0].corner as usize;
     let other = edge[1].corner as usize;
@@ -280,7 +285,7 @@ fn bends_outwards(edge: &[HalfEdge], positions: &[Vec3], triangles: &[[u32; 3]],
     let length = to.distance(from);
     let own_height = normal.length() / length;
     let other_height = (to - from).cross(other_far - from).length() / length;
-    unit.dot(other_far - from) <= VERTEX_NOISE * radius_m * (1.0 + other_height / own_height)
+    unit.dot(other_far - from) <= dent_m * (1.0 + other_height / own_height)
 }
 
 /// Chooses three vertices that span the set widely, so that the plane is well determined, and tests all others against

@@ -131,21 +131,33 @@ vec3 glossy(uint index, vec3 base, vec3 light, vec4 share, vec2 uv, float within
     }
     energy = of_unit.x + of_unit.y;
 #endif
+    vec3 f0 = mix(vec3(entity.f0), base, metallic);
 #if HIGHLIGHTS
     // A disc of half of a pixel's area.
     vec3 turn_x = dFdx(view.normal), turn_y = dFdy(view.normal);
     view.footprint = (dot(turn_x, turn_x) + dot(turn_y, turn_y)) / (4.0 * PI);
     // Loops are tested at their ends, as in the merge. What is NONE has no share.
+    float least = LEAST_HIGHLIGHT * dot(light + f0 * found.facing + found.grazing, vec3(1.0));
     uint i = 0;
     do {
-        Entity shining = ENTITY(entity.lights[i] == NONE ? 0 : entity.lights[i]);
-        vec2 part = share[i] * reflect_light(view, shining.centre.xyz - entity.eye - from_eye, shining);
-        found.facing += part.x * shining.emission;
-        found.grazing += part.y * shining.emission;
-        i++;
+        // A software device evaluates a highlight for each turn of the loop that evaluates any.
+        bool faint;
+        do {
+            Entity shining = ENTITY(entity.lights[i] == NONE ? 0 : entity.lights[i]);
+            vec3 to = shining.centre.xyz - entity.eye - from_eye;
+            float most = most_light(view, to, shining, max(f0.x, max(f0.y, f0.z)));
+            faint = share[i] * most * dot(shining.emission, vec3(1.0)) <= least;
+            i += faint ? 1 : 0;
+        } while (faint && i < entity.light_count);
+        if (i < entity.light_count) {
+            Entity shining = ENTITY(entity.lights[i] == NONE ? 0 : entity.lights[i]);
+            vec2 part = share[i] * reflect_light(view, shining.centre.xyz - entity.eye - from_eye, shining);
+            found.facing += part.x * shining.emission;
+            found.grazing += part.y * shining.emission;
+            i++;
+        }
     } while (i < entity.light_count);
 #endif
-    vec3 f0 = mix(vec3(entity.f0), base, metallic);
     vec3 specular = f0 * found.facing + found.grazing;
     // Light that microfacets pass on to each other: Kulla and Conty, Revisiting Physically Based Shading at Imageworks,
     // SIGGRAPH 2017 course, as a factor.

@@ -132,3 +132,21 @@ vec2 reflect_light(View view, vec3 to, Entity shining) {
     float term = schlick(half_cosine(view, along));
     return seen ? above * value * vec2(1.0 - term, term) : vec2(0.0);
 }
+
+// A bound of what a surface of reflectance `f0` reflects of a light of radiance 1: all its microfacets have the density of
+// those that are nearest to the middle of the lobe.
+float most_light(View view, vec3 to, Entity shining, float f0) {
+    float distance = max(length(to), 1e-30);
+    vec3 toward = to / distance, halves = toward + view.toward;
+    float sine = min(1.0 / (shining.centre.w * distance), 1.0);
+    float half_z = dot(view.normal, halves), across = length(halves - half_z * view.normal), size = length(halves);
+    // The half vector of the light's rim lies no farther off than half as far as the rim.
+    float nearest = max(across - sine, 0.0) / (min(half_z + sine, 2.0) * view.alpha);
+    float lowest = max(half_z - sine, 0.0);
+    float radius = sine / max(lowest * view.alpha, 1e-6);
+    float spread = 1.0 + nearest * nearest;
+    float share = min((radius * radius + view.footprint / (view.alpha * view.alpha)) / (spread * spread), 1.0);
+    float lit = clamp(dot(view.normal, toward) + sine, 0.0, 1.0);
+    float term = schlick(max(0.5 * size - sine, 0.0));
+    return lowest > 0.3 ? (f0 + term) * share * 4.0 * size / lowest * masking(view, lit) * lit : lit * EVERYTHING;
+}

@@ -56,6 +56,9 @@ pub const WIDE_OUTLINE: f64 = 0.01;
 /// first, the light is a point; above the second it is its outline.
 pub const LOW_HALF_Z: [f64; 2] = [0.02, 0.12];
 
+/// Share of a pixel's radiance below which it leaves a highlight out.
+const LEAST_HIGHLIGHT: f64 = 0.002;
+
 /// A receiver that reflects: its vertices in the buffers of light.
 #[derive(Clone, Copy, Debug)]
 pub struct Glossy {
@@ -83,6 +86,7 @@ pub fn macros(row: ShaderPermutation) -> ShaderPermutation {
         ("MOST_SLOPES", MOST_SLOPES),
         ("WIDENED", WIDENED),
         ("WIDE_OUTLINE", WIDE_OUTLINE),
+        ("LEAST_HIGHLIGHT", LEAST_HIGHLIGHT),
         ("LOW_FROM", LOW_HALF_Z[0]),
         ("LOW_TO", LOW_HALF_Z[1]),
         ("TABLE", lobe::TABLE as f64),

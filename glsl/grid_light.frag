@@ -15,13 +15,12 @@ layout(location = 0) out uvec4 kept;
 void main() {
     CellTriangle found = cell_triangle(corners, push.cells, place.xy);
     uvec3 lit = push.first + found.vertices;
-    bool edge = read_marks(lit);
+    bool edge = use_vertices(lit, found.weights);
     uvec2 chain = chain_of(push.cluster_first, found.first);
+    // Other cells of the block have what their vertices say, so that pixels beside them need not be evaluated.
     chain.y = edge ? chain.y & ~OWN_MAPS : 0;
     Entity receiver = ENTITY(push.receiver);
     Facing facings[FACINGS];
     facings[0] = facing_of(receiver, push.normal.xyz, 1.0, NONE, 0);
-    // Other cells of the block have what their vertices say, so that pixels beside them need not be evaluated.
-    vec3 light = edge ? blend(soft, lit, found.weights) : blend(radiosity, lit, found.weights);
-    kept = pixel_light(receiver, light, at, facings, chain);
+    kept = pixel_light(receiver, at, facings, chain);
 }

@@ -1,19 +1,12 @@
 // What a vertex says of shadows around it, for pixels of its triangles: whether an edge is near that its light shows
-// badly; how the shadows of each light stand, two bits for lights whose numbers leave the same rest; and a bit for
-// occluders that take any of a light or whose edges are near, shared alike. It is kept as a float that is neither
-// denormal nor NaN, which no addition of 0 changes.
-const uint OPEN = 1, DARK = 2, CUT = 3; // open to all of a light, hidden from it, or near an edge; 0 where it is not listed
-
-uint state_bit(uint light) {
-    return 2 * (light % MARKED_LIGHTS);
-}
-
+// badly, and a bit for occluders that take any of a light or whose edges are near, shared by those whose numbers leave the
+// same rest. It is kept as a float that is neither denormal nor NaN, which no addition of 0 changes.
 uint occluder_bit(uint occluder) {
     return 1u << occluder % MARKED_OCCLUDERS;
 }
 
-float pack_marks(bool edge, uint lights, uint occluders) {
-    uint bits = (edge ? 1u : 0u) | lights << 1 | occluders << 1 + 2 * MARKED_LIGHTS;
+float pack_marks(bool edge, uint occluders) {
+    uint bits = (edge ? 1u : 0u) | occluders << 1;
     // Six of thirty bits lie in the middle of the exponent, whose first is set and whose last is not.
     return uintBitsToFloat((bits & 0x7fffff) | (bits >> 23 & 63) << 24 | (bits >> 29) << 31 | 1u << 30);
 }
@@ -31,4 +24,8 @@ uint marks_of(textureBuffer radiosity, uvec3 corners) {
 
 bool marks_edge(uint marks) {
     return (marks & 1) != 0;
+}
+
+uint marked_occluders(uint marks) {
+    return marks >> 1;
 }

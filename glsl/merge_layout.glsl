@@ -35,8 +35,9 @@ float lattice_edges(Entity entity) {
     return float(uint(entity.shift.w) >> FIT_BITS);
 }
 
-// An entry: what one lookup is for, as ListEntry::pack puts it together. The first ENTRY_BITS bits: entity. As many
-// more: the light whose chain this is, SKY_CHAIN for the sky's.
+// An entry: what one lookup is for, as ListEntry::pack puts it together. The first ENTRY_BITS bits: entity, or of a sharp
+// light how many entries of its chain stand before it. As many more: the light whose chain this is, SKY_CHAIN for the
+// sky's.
 const uint SKY_CHAIN = (1u << ENTRY_BITS) - 1u;
 const uint ENTRY_LIGHT = 1u << 2 * ENTRY_BITS;      // meets the light rather than multiplying an occluder
 const uint ENTRY_CHANNEL = 2 * ENTRY_BITS + 1;      // two bits: 0 to 2 for a channel of a radiance field, 3 for a light of one colour

@@ -20,18 +20,26 @@ uvec2 self_cell(uint i) {
 }
 #include "self_visibility.glsl"
 #endif
-#define STATES 1
+#define BLENDS 1
+layout(binding = 14) uniform textureBuffer irradiances; // of all vertices by one light after another
+uvec3 lit_vertices; // of the pixel's triangle, among all
+vec3 vertex_weights;
 #include "sharp_light.glsl"
 #if SHOWN
 layout(binding = 9) uniform utextureBuffer shown_lights_of; // of every entity
+layout(binding = 15) uniform textureBuffer shown_shares_of; // of every vertex
+vec4 shares_at(uint vertex) {
+    return texelFetch(shown_shares_of, int(vertex));
+}
 #endif
 #include "screen_light.glsl"
 
-// What the vertices of a pixel's triangle say of shadows: returns whether an edge is near, and keeps the rest.
-bool read_marks(uvec3 corners) {
-    uint marks = marks_of(radiosity, corners);
-    light_states = marks >> 1;
-    near_occluders = marks >> 1 + 2 * MARKED_LIGHTS;
+// Keeps the vertices of the pixel's triangle, and returns whether an edge is near one of them.
+bool use_vertices(uvec3 lit, vec3 weights) {
+    lit_vertices = lit;
+    vertex_weights = weights;
+    uint marks = marks_of(radiosity, lit);
+    near_occluders = marked_occluders(marks);
     return marks_edge(marks);
 }
 
@@ -40,22 +48,28 @@ uvec2 chain_of(uint cluster_first, uint v) {
     return texelFetch(chains, int(cluster_first + v / WORKGROUP)).xy;
 }
 
-// What is kept of a pixel: `soft` light, and that of sharp lights where the chain has any entries. `at`: object's frame, metres.
-uvec4 pixel_light(Entity receiver, vec3 soft, vec3 at, Facing facings[FACINGS], uvec2 chain) {
+// What is kept of a pixel: light of its chain and of the rest, or where the chain has no entries as vertices have it.
+// `at`: object's frame, metres.
+uvec4 pixel_light(Entity receiver, vec3 at, Facing facings[FACINGS], uvec2 chain) {
     Surface surface;
     surface.position = receiver.scale * to_world(receiver, at);
     surface.origin = receiver.centre.xyz;
     surface.inverse_radius = receiver.centre.w;
     surface.facings = facings;
     surface.step = receiver.scale * max(length(dFdx(at)), length(dFdy(at)));
-    vec3 light = soft;
 #if SHOWN
     shown_lights = texelFetch(shown_lights_of, int(push.receiver));
+    shown_shares = vertex_weights.x * shares_at(lit_vertices.x) + vertex_weights.y * shares_at(lit_vertices.y)
+                 + vertex_weights.z * shares_at(lit_vertices.z);
 #else
     const vec4 shown_shares = vec4(0.0);
 #endif
+    vec3 light, rest;
     if (chain.y > 0) {
-        light += sharp_sum(surface, chain.x, chain.y) * receiver.albedo;
+        rest = blend(soft, lit_vertices, vertex_weights);
+        light = rest + sharp_sum(surface, chain.x, chain.y) * receiver.albedo;
+    } else {
+        light = rest = blend(radiosity, lit_vertices, vertex_weights);
     }
-    return pack_light(push.receiver, gl_FragCoord.z, light, shown_shares, shows_badly(receiver.albedo, soft));
+    return pack_light(push.receiver, gl_FragCoord.z, light, shown_shares, missed > tolerable_miss(receiver.albedo, rest));
 }

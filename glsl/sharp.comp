@@ -22,6 +22,15 @@ READ_UVEC2(7, SelfCells, self_cells, self_cell)
 #include "self_visibility.glsl"
 #endif
 #define FACINGS 1
+#if EDGES
+#define KEEPS 1
+layout(std430, binding = 12) buffer Irradiances { float irradiances[]; }; // of all vertices by one light after another
+layout(push_constant) uniform Push {
+    uint kept_lights;
+    uint all_vertices;
+} push;
+uint kept_vertex; // the place among a light's irradiances of the vertex that is lit
+#endif
 #include "sharp_light.glsl"
 #if SHOWN
 layout(std430, binding = 9) readonly buffer ShownLights { uvec4 shown_lights_of[]; }; // of every entity
@@ -52,6 +61,10 @@ void main() {
     vec4 sum = soft_at(cluster.radiosity_first + v);
 #if EDGES
     vec3 soft = sum.rgb;
+    kept_vertex = cluster.radiosity_first + v;
+    for (uint l = 0; l < push.kept_lights; l++) {
+        irradiances[l * push.all_vertices + kept_vertex] = 0.0;
+    }
 #endif
 #if SHOWN
     shown_lights = shown_lights_of[cluster.receiver];
@@ -60,7 +73,9 @@ void main() {
         sum.rgb += sharp_sum(surface, cluster.entry_first, cluster.sharp_count) * receiver.albedo;
     }
 #if EDGES
-    sum.w = pack_marks(shows_badly(receiver.albedo, soft), light_states, near_occluders);
+    float tolerable = tolerable_miss(receiver.albedo, soft);
+    sum.w = pack_marks(missed > tolerable, near_occluders);
+    settle_kept(tolerable);
 #endif
     radiosity[cluster.radiosity_first + v] = sum;
 #if LAMPS

@@ -9,6 +9,8 @@
 #define EACH [[unroll]]
 #endif
 
+const uint BLOCKS = 5; // of a light: the whole, and its quarters
+
 #if SHOWN || PANELS
 float open_share; // irradiance by the current light's parts with nothing between, of radiance 1
 #endif
@@ -27,6 +29,11 @@ void note_share(uint light, float irradiance) {
 float lamps = 0.0; // share of the cosine-weighted view that lamps take, which light that leaves cannot pass
 #endif
 
+#if KEEPS
+const float KEPT_SCALE = 4096.0; // of irradiances that halves hold
+const float LEAST_KEPT = 1e-4 / KEPT_SCALE;
+#endif
+
 #if EDGES
 // Vertices, and pixels that are evaluated for their neighbours too, carry a shadow's edge badly where its penumbra is
 // narrow against the distance to the next. The error grows with the square of that distance over the penumbra's width,
@@ -36,22 +43,16 @@ float missed = 0.0; // most, over all lights, of the square of `finest` times th
 float open_light = 0.0; // of all lights, nothing between
 float curved;       // irradiance by the current light, each part's by the square of the step over its distance, of radiance 1
 
-// Whether an edge is near that shows badly between here and the next, on a surface that sends out `soft` light besides.
-bool shows_badly(vec3 albedo, vec3 soft) {
-    float white = dot(albedo, vec3(1.0));
-    return EDGE_STEPS * EDGE_STEPS * white * missed > white * open_light + dot(soft, vec3(1.0));
+// What vertices may miss of a light on a surface that sends out `soft` light besides that of all lights.
+float tolerable_miss(vec3 albedo, vec3 soft) {
+    float besides = dot(soft, vec3(1.0)) / max(dot(albedo, vec3(1.0)), 1e-30);
+    return (open_light + besides) / (EDGE_STEPS * EDGE_STEPS);
 }
-#endif
 
-#if EDGES || STATES
 #include "marks.glsl"
-// With STATES as the vertices of a pixel's triangle tell them, else as this vertex finds them.
-uint light_states = 0;
+// Occluders that take any of a light or whose edges are near: with BLENDS as the vertices of a pixel's triangle tell them,
+// else as this vertex finds them.
 uint near_occluders = 0;
-#endif
-
-#if EDGES && !STATES
-#define FINDS_STATES 1
 #endif
 
 // Which way a vertex faces, and what its own mesh leaves of its view.
@@ -136,21 +137,58 @@ void find_rim(float ramp, Entity shining, float step) {
     finest = max(finest, near ? min(2.0 * change, MOST_STEPS) : 0.0);
 }
 
-// Notes an occluder that leaves so much of a block's parts and has its nearest edge at `finest`: whether it covers the
-// block with none, and the nearest edge of all.
-void note_occluder(uint packed, vec4 free, inout bool covered, inout float nearest) {
-#if FINDS_STATES
+// Notes an occluder that leaves so much of a block's parts and has its nearest edge at `finest`.
+void note_occluder(uint packed, vec4 free, uint b, inout uint covered, inout float nearest) {
+#if KEEPS
     bool matters = finest > 0.0 || free != vec4(1.0);
     near_occluders |= matters ? occluder_bit(packed & SKY_CHAIN) : 0;
 #endif
-    covered = covered || (finest == 0.0 && free == vec4(0.0));
+    covered |= finest == 0.0 && free == vec4(0.0) ? 1u << b : 0;
     nearest = max(nearest, finest);
 }
 
-void add_open(float irradiance, float cone, Entity shining) {
-    float white = dot(shining.emission, vec3(1.0)), light = irradiance * white;
-    open_light += light * cone;
-    missed = max(missed, max(finest * finest * light, NEAR_LIGHT * curved * cone * white));
+// Adds a light to all; returns what vertices miss of it.
+float add_open(float irradiance, float cone, Entity shining) {
+    float white = cone * dot(shining.emission, vec3(1.0));
+    float miss = white * max(finest * finest * irradiance, NEAR_LIGHT * curved);
+    open_light += white * irradiance;
+    missed = max(missed, miss);
+    return miss;
+}
+#endif
+
+#if KEEPS
+// Keeps the irradiance by a light of radiance 1 for pixels around the vertex, as two halves with what vertices miss of it,
+// until all lights are known.
+void keep(Entity shining, float irradiance, float miss) {
+    if (shining.irradiance_first != NONE) {
+        vec2 kept = vec2(min(irradiance * KEPT_SCALE, 65504.0), log2(max(miss, 1e-30)));
+        irradiances[shining.irradiance_first + kept_vertex] = uintBitsToFloat(packHalf2x16(kept));
+    }
+}
+
+// Once all lights are known: what is kept becomes the irradiance, below zero where pixels need to evaluate the light.
+void settle_kept(float tolerable) {
+    for (uint l = 0; l < push.kept_lights; l++) {
+        uint at = l * push.all_vertices + kept_vertex;
+        vec2 kept = unpackHalf2x16(floatBitsToUint(irradiances[at]));
+        float irradiance = kept.x / KEPT_SCALE;
+        bool needed = kept != vec2(0.0) && exp2(kept.y) > tolerable;
+        irradiances[at] = needed ? -max(irradiance, 1e-30) : irradiance;
+    }
+}
+#endif
+
+#if BLENDS
+// Irradiance by a light of radiance 1 between the vertices of a pixel's triangle. Returns whether they carry it well:
+// none of them needs pixels to evaluate it, and they see it all or none of them does.
+bool blended_irradiance(Entity shining, out float irradiance) {
+    bool is_kept = shining.irradiance_first != NONE;
+    uvec3 at = lit_vertices + (is_kept ? shining.irradiance_first : 0);
+    vec3 kept = vec3(texelFetch(irradiances, int(at.x)).x, texelFetch(irradiances, int(at.y)).x,
+                     texelFetch(irradiances, int(at.z)).x);
+    irradiance = dot(vertex_weights, kept);
+    return is_kept && (kept == vec3(0.0) || all(greaterThan(kept, vec3(0.0))));
 }
 #endif
 
@@ -356,32 +394,11 @@ bool has_outline(uint packed) {
 }
 
 #if CONES
-bool has_own_outline(Entity shining) {
-#if OUTLINES
-    return shining.light_kind == LIGHT_OUTLINE;
-#else
-    return false;
-#endif
-}
-
-// Whether the vertices around see nothing of the light of an entry's chain.
-bool is_dark(uint packed) {
-#if STATES
-    return (light_states >> state_bit(chain_light(packed)) & 3) == DARK;
-#else
-    return false;
-#endif
-}
-
-// Whether an entry is an occluder whose ball reaches into the cone around all parts of its chain's light, as far as the
+// Whether the ball of an entry's occluder reaches into the cone around all parts of its chain's light, as far as the
 // light.
 bool may_block(uint packed, Surface surface) {
-    if ((packed & ENTRY_LIGHT) != 0) {
-        return false;
-    }
-#if STATES
-    uint state = light_states >> state_bit(chain_light(packed)) & 3;
-    if (state == OPEN || state == DARK || (near_occluders & occluder_bit(packed & SKY_CHAIN)) == 0) {
+#if BLENDS
+    if ((near_occluders & occluder_bit(packed & SKY_CHAIN)) == 0) {
         return false;
     }
 #endif
@@ -400,31 +417,28 @@ bool may_block(uint packed, Surface surface) {
     return along > -radius && along - radius < distance + 1.0 / shining.w
         && off * sqrt(1.0 - sine * sine) - max(along, 0.0) * sine < radius;
 }
-
 #endif
 
-// The first entry from `i` on that has to be evaluated. With CONES these are occluders that may block, and lights that
-// end a chain of which an occluder was evaluated (`within`) or that have an outline of their own and are not dark;
-// without CONES all.
+// The first entry of a chain from `i` on that has to be evaluated: with CONES an occluder that may block, or the light;
+// without CONES any.
 // Values of this loop are read again behind it: on lavapipe a lane that leaves a loop early may lose what the loop does
 // not carry.
-uint next_entry(Surface surface, uint first, uint count, uint i, bool within) {
+uint next_entry(Surface surface, uint i) {
 #if CONES
     bool passes = false;
     do {
-        uint packed = entry_at(first + i);
-        bool ends = (packed & ENTRY_LIGHT) != 0;
-        passes = ends ? !within && (is_dark(packed) || !has_own_outline(ENTITY(chain_light(packed))))
-                      : !may_block(packed, surface);
+        uint packed = entry_at(i);
+        passes = (packed & ENTRY_LIGHT) == 0 && !may_block(packed, surface);
         i += passes ? 1 : 0;
-    } while (passes && i < count);
+    } while (passes);
 #endif
     return i;
 }
 
-// Irradiance by the light that ends the chain from entry `i` on, past the occluders that are listed before it; with
-// `open` past none. `open` is a constant, so the compiler keeps one side. `i` becomes the entry behind the light.
-vec3 chain_sum(Surface surface, Entity shining, bool open, uint first, uint count, inout uint i) {
+// Irradiance by a light past the occluders of its chain, from entry `i` to the light's. Each kind of occluder has a loop of
+// its own over all blocks: a software device runs the body of a loop once at least, whether any lane needs it or not.
+vec3 chain_sum(Surface surface, uint i, uint end) {
+    Entity shining = ENTITY(chain_light(entry_at(end)));
     SeenLight light = seen_light(shining.centre.xyz - surface.origin - surface.position, shining);
 #if OUTLINES && BOXES
     if (shining.light_kind == LIGHT_OUTLINE) {
@@ -433,8 +447,116 @@ vec3 chain_sum(Surface surface, Entity shining, bool open, uint first, uint coun
         light.box[1] = node_quad(own + 1).xyz / shining.centre.w;
     }
 #endif
-    uint b = light.fine >= 1.0 ? 1 : 0, last = light.fine <= 0.0 ? 0 : 4;
-    uint j = i;
+    uint first_block = light.fine >= 1.0 ? 1 : 0, last_block = light.fine <= 0.0 ? 0 : 4;
+    vec4 shares[BLOCKS]; // irradiance by the parts of each block
+#if SHOWN || PANELS
+    open_share = 0.0;
+#endif
+#if EDGES
+    float unblocked = 0.0;
+    curved = 0.0;
+    float nearest = 0.0; // `finest` of all occluders
+    uint covered = 0; // a bit for every block that one occluder hides whose own edges are far
+#endif
+    // Loops are tested at their ends, as in the merge.
+    uint b = first_block;
+    do {
+        shares[b] = part_shares(surface, light, block_of(light, b));
+#if EDGES
+        unblocked += dot(shares[b], vec4(1.0));
+#endif
+        b++;
+    } while (b <= last_block);
+    float shines = shining.light_kind == LIGHT_BALL ? shining.light_size : 1.0;
+    i = next_entry(surface, i);
+    uint packed = entry_at(i);
+    b = first_block;
+    do {
+        if (has_outline(packed)) {
+#if EDGES
+            finest = 0.0;
+#endif
+            vec4 free = let_through(ENTITY(packed & SKY_CHAIN), surface, light, block_of(light, b), true);
+            shares[b] *= free;
+#if EDGES
+            note_occluder(packed, free, b, covered, nearest);
+#endif
+            bool last = b == last_block;
+            b = last ? first_block : b + 1;
+            i = last ? next_entry(surface, i + 1) : i;
+            packed = entry_at(i);
+        }
+    } while (has_outline(packed));
+#if SHEETS
+    // All sheets before one block are put together first.
+    uint sheets = i;
+    SheetShadow shadow = no_shadow();
+    b = first_block;
+#if EDGES
+    finest = 0.0;
+#endif
+    do {
+        if (is_kind(packed, ENTRY_SHEET)) {
+            pass_sheet(shadow, ENTITY(packed & SKY_CHAIN), surface, light, block_of(light, b));
+#if KEEPS
+            near_occluders |= occluder_bit(packed & SKY_CHAIN);
+#endif
+            i = next_entry(surface, i + 1);
+            packed = entry_at(i);
+            if (!is_kind(packed, ENTRY_SHEET)) {
+                shares[b] *= shadow.free;
+                shadow = no_shadow();
+                i = b < last_block ? sheets : i;
+                packed = entry_at(i);
+                b++;
+            }
+        }
+    } while (is_kind(packed, ENTRY_SHEET));
+#if EDGES
+    nearest = max(nearest, finest);
+#endif
+#endif
+#if CUBOIDS
+    b = first_block;
+    do {
+        if (is_kind(packed, ENTRY_CUBOID)) {
+#if EDGES
+            finest = 0.0;
+#endif
+            vec4 free = past_cuboid(ENTITY(packed & SKY_CHAIN), surface, light, block_of(light, b));
+            shares[b] *= free;
+#if EDGES
+            note_occluder(packed, free, b, covered, nearest);
+#endif
+            bool last = b == last_block;
+            b = last ? first_block : b + 1;
+            i = last ? next_entry(surface, i + 1) : i;
+            packed = entry_at(i);
+        }
+    } while (is_kind(packed, ENTRY_CUBOID));
+#endif
+#if GLOBES
+    do {
+        if (is_kind(packed, ENTRY_GLOBE)) {
+            shines *= 1.0 - ENTITY(packed & SKY_CHAIN).opacity;
+#if KEEPS
+            near_occluders |= occluder_bit(packed & SKY_CHAIN);
+#endif
+            i = next_entry(surface, i + 1);
+            packed = entry_at(i);
+        }
+    } while (is_kind(packed, ENTRY_GLOBE));
+#endif
+#if OUTLINES
+    // Of a light with an outline of its own, as much of each part shines as the outline covers.
+    b = first_block;
+    do {
+        if (shining.light_kind == LIGHT_OUTLINE) {
+            shares[b] *= 1.0 - let_through(shining, surface, light, block_of(light, b), false);
+            b++;
+        }
+    } while (shining.light_kind == LIGHT_OUTLINE && b <= last_block);
+#endif
     float irradiance = 0.0;
 #if COLORS
     bool has_colors = shining.radiance_base != NONE;
@@ -442,136 +564,43 @@ vec3 chain_sum(Surface surface, Entity shining, bool open, uint first, uint coun
     vec3 down = to_object(shining, light.down), colored = vec3(0.0);
     mat3x4 colors = lamp_colors(has_colors ? shining.radiance_base : 0, toward, light.sine);
 #endif
-#if SHOWN || PANELS
-    open_share = 0.0;
-#endif
-#if EDGES
-    float unblocked = 0.0, passed = 0.0;
-    curved = 0.0;
-    float nearest = 0.0; // `finest` of all occluders
-    bool hidden = !open; // every block behind one occluder whose own edges are far
-#endif
-    // Loops are tested at their ends, as in the merge.
+    b = first_block;
     do {
-        Block block = block_of(light, b);
-        vec4 share = part_shares(surface, light, block);
-#if EDGES
-        unblocked += dot(share, vec4(1.0));
-#endif
-        if (!open) {
-            j = i;
-            uint packed = entry_at(first + j);
-#if EDGES
-            bool covered = false;
-#endif
-            do {
-                if (has_outline(packed)) {
-#if EDGES
-                    finest = 0.0;
-#endif
-                    vec4 free = let_through(ENTITY(packed & SKY_CHAIN), surface, light, block, true);
-                    share *= free;
-#if EDGES
-                    note_occluder(packed, free, covered, nearest);
-#endif
-                    j = next_entry(surface, first, count, j + 1, true);
-                    packed = entry_at(first + j);
-                }
-            } while (has_outline(packed) && j < count);
-#if SHEETS
-            SheetShadow shadow;
-            shadow.free = vec4(1.0);
-            EACH for (uint k = 0; k < 4; k++) {
-                shadow.edges[k] = vec3(0.0);
-            }
-            do {
-                if (is_kind(packed, ENTRY_SHEET)) {
-                    pass_sheet(shadow, ENTITY(packed & SKY_CHAIN), surface, light, block);
-#if FINDS_STATES
-                    near_occluders |= occluder_bit(packed & SKY_CHAIN);
-#endif
-                    j = next_entry(surface, first, count, j + 1, true);
-                    packed = entry_at(first + j);
-                }
-            } while (is_kind(packed, ENTRY_SHEET) && j < count);
-            share *= shadow.free;
-#if EDGES
-            nearest = max(nearest, finest);
-#endif
-#endif
-#if CUBOIDS
-            do {
-                if (is_kind(packed, ENTRY_CUBOID)) {
-#if EDGES
-                    finest = 0.0;
-#endif
-                    vec4 free = past_cuboid(ENTITY(packed & SKY_CHAIN), surface, light, block);
-                    share *= free;
-#if EDGES
-                    note_occluder(packed, free, covered, nearest);
-#endif
-                    j = next_entry(surface, first, count, j + 1, true);
-                    packed = entry_at(first + j);
-                }
-            } while (is_kind(packed, ENTRY_CUBOID) && j < count);
-#endif
-#if GLOBES
-            do {
-                if (is_kind(packed, ENTRY_GLOBE)) {
-                    share *= 1.0 - ENTITY(packed & SKY_CHAIN).opacity;
-#if FINDS_STATES
-                    near_occluders |= occluder_bit(packed & SKY_CHAIN);
-#endif
-                    j = next_entry(surface, first, count, j + 1, true);
-                    packed = entry_at(first + j);
-                }
-            } while (is_kind(packed, ENTRY_GLOBE) && j < count);
-#endif
-#if EDGES
-            hidden = hidden && covered;
-#endif
-        }
-#if EDGES
-        passed += dot(share, vec4(1.0));
-#endif
-        vec4 shines = vec4(shining.light_kind == LIGHT_BALL ? shining.light_size : 1.0);
-#if OUTLINES
-        if (!open) {
-            // Of a light with an outline of its own, as much of each part shines as the outline covers.
-            vec4 dark = let_through(shining, surface, light, block, false);
-            shines = shining.light_kind == LIGHT_OUTLINE ? 1.0 - dark : shines;
-        }
-#endif
-        irradiance += dot(share, shines);
+        irradiance += shines * dot(shares[b], vec4(1.0));
 #if COLORS
+        Block block = block_of(light, b);
         EACH for (uint k = 0; k < 4; k++) {
             vec2 place = part_place(light, block, k);
             vec3 factor = max(vec4(place.x * across + place.y * down, 1.0) * colors, 0.0);
-            colored += share[k] * shines[k] * factor;
+            colored += shines * shares[b][k] * factor;
         }
 #endif
         b++;
-    } while (b <= last);
-    i = j + 1;
+    } while (b <= last_block);
 #if COLORS
     irradiance = has_colors ? dot(colored, vec3(1.0 / 3.0)) : irradiance;
 #endif
     float ramp = ramp_of(light, shining), cone = clamp(ramp, 0.0, 1.0);
     cone *= cone;
 #if EDGES
+    bool hidden = covered == (2u << last_block) - (1u << first_block);
     finest = hidden ? 0.0 : nearest;
     find_rim(ramp, shining, surface.step / max(light.distance, 1e-30));
-    add_open(unblocked, cone, shining);
-#endif
-#if FINDS_STATES
-    uint state = finest > 0.0 ? CUT : passed >= 0.999 * unblocked ? OPEN : passed <= 0.001 * unblocked ? DARK : CUT;
-    light_states |= state << state_bit(chain_light(entry_at(first + j)));
+    float miss = add_open(unblocked, cone, shining);
 #endif
 #if SHOWN
-    note_share(chain_light(entry_at(first + j)), irradiance * cone);
+    note_share(chain_light(entry_at(end)), irradiance * cone);
 #endif
 #if PANELS
     irradiance *= over_parts(surface, light);
+#endif
+#if KEEPS
+    bool dark = irradiance <= 0.001 * unblocked && unblocked > 0.0;
+#if COLORS
+    miss = has_colors ? EVERYTHING : miss;
+#endif
+    // What is not dark is kept as more than nothing.
+    keep(shining, dark ? 0.0 : max(irradiance * cone, LEAST_KEPT), miss);
 #endif
 #if LAMPS
     lamps += irradiance / PI;
@@ -584,45 +613,29 @@ vec3 chain_sum(Surface surface, Entity shining, bool open, uint first, uint coun
     return cone * shining.emission * arriving;
 }
 
-#if CONES
-// Of the lights of `count` entries from `first`, those that no occluder may block here: their irradiance.
-vec3 open_sum(Surface surface, uint first, uint count) {
-    vec3 sum = vec3(0.0);
-    uint i = 0;
-    do {
-        bool open = true, ends = false;
-        do {
-            uint packed = entry_at(first + i);
-            open = open && !may_block(packed, surface);
-            ends = (packed & ENTRY_LIGHT) != 0;
-            i += ends ? 0 : 1;
-        } while (!ends);
-        uint packed = entry_at(first + i);
-        Entity shining = ENTITY(chain_light(packed));
-        if (open && !is_dark(packed) && !has_own_outline(shining)) {
-            sum += chain_sum(surface, shining, true, first, count, i);
-        } else {
-            i++;
-        }
-    } while (i < count);
-    return sum;
-}
-#endif
-
-// Irradiance by all lights of `count` entries from `first`. Where a scene has several lights, most are open to most
-// points: those are added up first, because a software device evaluates an occluder for each turn of the loop that
-// evaluates any.
+// Irradiance by all lights of `count` entries from `first`: those that a pixel's vertices carry well are blended, the
+// others evaluated. A light's entry tells how many occluders stand before it.
 vec3 sharp_sum(Surface surface, uint first, uint count) {
     vec3 sum = vec3(0.0);
-#if CONES
-    sum = open_sum(surface, first, count);
-#endif
-    uint i = 0;
+    uint left = count;
     do {
-        i = next_entry(surface, first, count, i, false);
-        if (i < count) {
-            sum += chain_sum(surface, ENTITY(chain_light(entry_at(first + i))), false, first, count, i);
+#if BLENDS
+        bool blends;
+        do {
+            uint packed = entry_at(first + left - 1);
+            Entity shining = ENTITY(chain_light(packed));
+            float irradiance;
+            blends = blended_irradiance(shining, irradiance);
+            sum += blends ? irradiance * shining.emission : vec3(0.0);
+            open_light += blends ? irradiance * dot(shining.emission, vec3(1.0)) : 0.0;
+            left -= blends ? 1 + (packed & SKY_CHAIN) : 0;
+        } while (blends && left > 0);
+#endif
+        if (left > 0) {
+            uint end = first + left - 1;
+            left -= 1 + (entry_at(end) & SKY_CHAIN);
+            sum += chain_sum(surface, first + left, end);
         }
-    } while (i < count);
+    } while (left > 0);
     return sum;
 }

@@ -12,6 +12,10 @@ struct SheetShadow {
     vec3 edges[4]; // unit normals, towards what is blocked, of the side that runs nearest to each part
 };
 
+SheetShadow no_shadow() {
+    return SheetShadow(vec4(1.0), vec3[4](vec3(0.0), vec3(0.0), vec3(0.0), vec3(0.0)));
+}
+
 // Adds one more sheet. Two that meet in an edge, as the walls of a room, leave nothing free between them: their edges'
 // normals are opposite there.
 void pass_sheet(inout SheetShadow shadow, Entity entity, Surface surface, SeenLight light, Block block) {

@@ -39,6 +39,6 @@ void main() {
         facings[i].counts = !own_maps || triangle[i] / WORKGROUP == nearest / WORKGROUP;
 #endif
     }
-    read_marks(lit);
-    kept = pixel_light(receiver, blend(soft, lit, weights), at, facings, chain);
+    use_vertices(lit, weights);
+    kept = pixel_light(receiver, at, facings, chain);
 }

@@ -101,6 +101,11 @@ shared_struct! {
         light_ramp: [f32; 2],
         /// Of a sheet: half the sides of its rectangle, metres.
         half_sides: [f32; 2],
+        /// Of a sharp light: the first of its irradiances on all vertices, or [`NONE`] where they are not kept.
+        irradiance_first: u32,
+        /// Texels hold a multiple of four words.
+        unused: u32,
+        unused_pair: [f32; 2],
     }
 }
 
@@ -299,12 +304,16 @@ pub enum ListEntry {
         /// Whether the chain ends here and the next begins anew.
         last: bool,
     },
+    /// The end of a sharp light's chain, which so many entries stand before.
+    Sharp { entity: u32, occluders: u32 },
 }
 
 impl ListEntry {
-    /// The two entities that packed bits name; the second is [`ENTRY_ENTITIES`] in the sky's chain.
+    /// The two entities that packed bits name: the occluder or the light, and the light whose chain this is,
+    /// [`ENTRY_ENTITIES`] in the sky's.
     pub fn entities(packed: u32) -> [u32; 2] {
-        [packed & ENTRY_ENTITIES, packed >> ENTRY_BITS & ENTRY_ENTITIES]
+        let chain = packed >> ENTRY_BITS & ENTRY_ENTITIES;
+        [if Self::is_light(packed) { chain } else { packed & ENTRY_ENTITIES }, chain]
     }
 
     /// A number for each kind of those that are no lights.
@@ -321,6 +330,7 @@ impl ListEntry {
         let occlude = |entity: u32, light: Option<u32>, kind: u32| {
             entity | light.unwrap_or(ENTRY_ENTITIES) << ENTRY_BITS | kind << (2 * ENTRY_BITS + 1)
         };
+        let shine = |first: u32, light: u32, flags: u32| first | light << ENTRY_BITS | (1 | flags) << (2 * ENTRY_BITS);
         match self {
             ListEntry::Occlude { entity, light } => occlude(entity, light, 0),
             ListEntry::Cap { entity, light } => occlude(entity, light, 1),
@@ -329,9 +339,9 @@ impl ListEntry {
             ListEntry::Cuboid { entity, light } => occlude(entity, light, 4),
             ListEntry::Globe { entity, light } => occlude(entity, light, 5),
             ListEntry::Shine { entity, channel, last } => {
-                let flags = 1 | channel.unwrap_or(3) << 1 | u32::from(last) << 3;
-                entity | entity << ENTRY_BITS | flags << (2 * ENTRY_BITS)
+                shine(entity, entity, channel.unwrap_or(3) << 1 | u32::from(last) << 3)
             }
+            ListEntry::Sharp { entity, occluders } => shine(occluders, entity, 0),
         }
     }
 }
@@ -348,10 +358,8 @@ pub const HAS_HALVES: u32 = 1 << 31;
 /// Flag of the number of a cluster's entries, for pixels: only maps of its own vertices go with them, as those of
 /// neighbouring clusters have other shadows.
 pub const OWN_MAPS: u32 = 1 << 31;
-/// Lights and occluders that the marks of a vertex keep apart: `glsl/marks.glsl`. Those whose numbers leave the same rest
-/// share bits.
-const MARKED_LIGHTS: u32 = 8;
-const MARKED_OCCLUDERS: u32 = 13;
+/// Occluders that the marks of a vertex keep apart: `glsl/marks.glsl`. Those whose numbers leave the same rest share a bit.
+const MARKED_OCCLUDERS: u32 = 29;
 /// Bits of a lattice's factors (see [`crate::field::Fit::packed`]).
 pub const FIT_BITS: u32 = 21;
 /// How far apart tags of entities are in a picture's alpha: as 8 bits tell.
@@ -360,7 +368,7 @@ pub const TAG_STEP: f32 = 1.0 / 255.0;
 pub const COSINE_LOBE: [f64; 3] = [0.09375, 0.5, 0.46875];
 
 /// The macros that every shader has: what both languages have to agree on.
-pub fn shared_macros() -> [(&'static str, String); 16] {
+pub fn shared_macros() -> [(&'static str, String); 15] {
     let [a, b, c] = COSINE_LOBE;
     let kind = |kind: LightKind| format!("{}u", kind as u32);
     [
@@ -369,7 +377,6 @@ pub fn shared_macros() -> [(&'static str, String); 16] {
         ("UPWARDS", format!("{UPWARDS:#x}u")),
         ("HAS_HALVES", format!("{HAS_HALVES:#x}u")),
         ("OWN_MAPS", format!("{OWN_MAPS:#x}u")),
-        ("MARKED_LIGHTS", format!("{MARKED_LIGHTS}u")),
         ("MARKED_OCCLUDERS", format!("{MARKED_OCCLUDERS}u")),
         ("FIT_BITS", FIT_BITS.to_string()),
         ("TAG_STEP", format!("{TAG_STEP:?}")),

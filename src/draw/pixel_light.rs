@@ -65,8 +65,10 @@ pub struct PixelLight<'d> {
     pub self_cells: &'d Buffer,
     /// Positions and normals of all meshes.
     pub vertices: &'d Buffer,
-    /// Of every entity the lights that its highlights are of, where the scene has any.
-    pub shown_lights: Option<&'d Buffer>,
+    /// Of every entity the lights that its highlights are of, and their shares at all vertices, where the scene has any.
+    pub shown: Option<[&'d Buffer; 2]>,
+    /// Of all vertices by one light after another; see [`crate::sharp`].
+    pub irradiances: &'d Buffer,
 }
 
 /// Texel views of buffers, in the order of their bindings.
@@ -349,13 +351,15 @@ impl LightImages {
             (light.vertices, QUAD_FORMAT),
         ])?;
         let texel = |buffer: &'r Buffer, format| TexelView::new(buffer, format).map(Bind::Texel);
-        binds.push(light.shown_lights.map_or(Ok(Bind::None), |lights| texel(lights, grid::QUADS))?);
+        binds.push(light.shown.map_or(Ok(Bind::None), |[lights, _]| texel(lights, grid::QUADS))?);
         binds.push(texel(light.self_cells, pairs)?);
         match mask {
             Some((paint, buffer)) => binds.extend([texel(buffer, vk::Format::R32_UINT)?, Bind::Texture(paint.texture)]),
             None => binds.extend([Bind::None, Bind::None]),
         }
         binds.push(Bind::Image(&self.coarse.light));
+        binds.push(texel(light.irradiances, vk::Format::R32_SFLOAT)?);
+        binds.push(light.shown.map_or(Ok(Bind::None), |[_, shares]| texel(shares, QUAD_FORMAT))?);
         Ok(binds)
     }
 }

@@ -162,6 +162,8 @@ impl Frame {
         let sharp = permutation::sharp(&options, &permutation, &methods, &scene, &buffers);
         if sharp.is_some() {
             radiosity.keep_soft()?;
+            let is_kept = |light: &usize| scene.entities[*light].emits && methods[*light].is_sharp();
+            radiosity.keep_irradiances((0..scene.entities.len()).filter(is_kept))?;
         }
         let threads = if device.info.is_software() { gpu::driver_threads() } else { 1 };
         let mut lists = ClusterLists::new(threads);
@@ -173,7 +175,7 @@ impl Frame {
             lists.set_near(std::mem::take(&mut near[index]), 2.0 * buffers.surface(index).reach_m);
         }
         let sharp = sharp.map(|wanted| wanted.fitting(device, buffers.sharp(), radiosity.soft()));
-        let pixels = pixel_shading(device, &options, &buffers, radiosity.soft(), sharp);
+        let pixels = pixel_shading(device, &options, &buffers, &radiosity, sharp);
         if options.shading == Some(Shading::Pixel) && sharp.is_some() && pixels.is_none() {
             log::warn!(
                 "no pixel evaluates lights: the device's texel buffers cannot hold the silhouette fields or the light of all vertices"
@@ -327,6 +329,7 @@ impl Frame {
             soft: self.radiosity.soft_direct(),
             shown: self.kept_for_gloss().map(|[_, lights, shares]| [lights, shares]),
             lamps: self.radiosity.lamps(),
+            irradiances: self.radiosity.irradiances(),
         }
     }
 

@@ -1,13 +1,15 @@
 //! Permutations of a scene's passes: the options, restricted to features of the scene and limits of the device.
 
 use super::Options;
+use super::radiosity::RadiosityBuffers;
 use crate::field::silhouette::SilhouetteField;
-use crate::gpu::{Buffer, Device, TexelView};
+use crate::gpu::{Device, TexelView};
 use crate::layout::{DeviceEntity, QUAD_FORMAT};
 use crate::merge::variant::{MergePermutation, Variant};
 use crate::scene::{LightMethod, Scene};
 use crate::scene_buffers::SceneBuffers;
 use crate::sharp::SharpPermutation;
+use ash::vk;
 
 /// The permutation with its variant less the texel views or uniform blocks that cannot hold the scene.
 pub(super) fn usable(
@@ -78,11 +80,14 @@ pub(super) fn pixel_shading(
     device: &Device,
     options: &Options,
     buffers: &SceneBuffers,
-    soft: &Buffer,
+    radiosity: &RadiosityBuffers,
     sharp: Option<SharpPermutation>,
 ) -> Option<SharpPermutation> {
     let [nodes, cells, _] = buffers.sharp();
-    sharp.filter(|_| options.shades_pixels() && SharpPermutation::fits_views(device, [nodes, cells, soft]))
+    let (irradiances, _) = radiosity.irradiances()?;
+    let fits = SharpPermutation::fits_views(device, [nodes, cells, radiosity.soft()])
+        && TexelView::fits(device, vk::Format::R32_SFLOAT, irradiances.size_bytes);
+    sharp.filter(|_| options.shades_pixels() && fits)
 }
 
 /// Whether any light of the scene meets the chains of the merge. The sky does in any case.

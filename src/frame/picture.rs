@@ -116,7 +116,7 @@ impl Frame {
     /// What makes pictures with these options.
     fn draw(&self, options: &Options) -> Result<Draw> {
         let sharp = self.sharp.as_ref().map(|sharp| sharp.permutation);
-        let pixels = pixel_shading(&self.device, options, &self.buffers, self.radiosity.soft(), sharp);
+        let pixels = pixel_shading(&self.device, options, &self.buffers, &self.radiosity, sharp);
         let lights = self.reflectors.lights(pixels, sharp);
         Draw::new(&self.device, &self.library, options.size, options.antialias, lights)
     }
@@ -163,6 +163,7 @@ impl Frame {
     /// Input of pixels that evaluate sharp lights in a viewport.
     fn pixel_light(&self, viewport: &Viewport) -> Option<PixelLight<'_>> {
         let chains = self.chains.as_ref().filter(|chains| chains.is_ready())?;
+        let (irradiances, _) = self.radiosity.irradiances()?;
         (self.picture.draw.evaluates_pixels() && viewport.shows_light()).then(|| PixelLight {
             entities: &chains.entities,
             silhouettes: [&self.buffers.silhouettes.nodes, &self.buffers.silhouettes.cells],
@@ -171,7 +172,8 @@ impl Frame {
             soft: self.radiosity.soft(),
             self_cells: &self.buffers.self_cells,
             vertices: &self.buffers.vertices,
-            shown_lights: self.reflections.as_ref().map(|reflections| &reflections.shown_lights),
+            shown: self.kept_for_gloss().map(|[_, lights, shares]| [lights, shares]),
+            irradiances,
         })
     }
 

@@ -163,6 +163,8 @@ impl Frame {
             half_sides: sheet.map_or([0.0; 2], |rectangle| rectangle.half_m.map(|half| half as f32)),
             blocked_base: device_mesh.blocked.as_ref().map_or(0, FieldSlot::quad),
             radiance_base,
+            irradiance_first: self.radiosity.irradiance_first(index).unwrap_or(NONE),
+            ..layout::DeviceEntity::default()
         }
     }
 

@@ -18,6 +18,8 @@ pub(super) struct RadiosityBuffers {
     direct: Option<Direct>,
     /// Zeros, where mirrors show nothing but lamps.
     dark: Option<Buffer>,
+    /// Irradiance of every vertex by sharp lights, where pixels evaluate these.
+    irradiances: Option<Irradiances>,
     /// The first byte of each entity.
     pub offsets: Vec<u64>,
     comparisons: [Option<Buffer>; 2],
@@ -29,6 +31,17 @@ struct Direct {
     soft: Option<Buffer>,
     /// Share of its view that sharp lights take of every vertex, a float each.
     lamps: Option<Buffer>,
+}
+
+/// Sharp lights whose irradiances are kept. Pixels evaluate those beyond wherever they evaluate any.
+const MOST_KEPT_LIGHTS: usize = 64;
+
+/// Irradiance of every vertex by each of the first sharp lights, a float each: of one light on all vertices, then of the
+/// next. Zero where it is dark, and below where pixels around the vertex have to evaluate the light.
+struct Irradiances {
+    buffer: Buffer,
+    /// The lights' entities, in this order.
+    lights: Vec<usize>,
 }
 
 impl RadiosityBuffers {
@@ -46,6 +59,7 @@ impl RadiosityBuffers {
             soft: None,
             direct: None,
             dark: None,
+            irradiances: None,
             offsets,
             comparisons: Default::default(),
         })
@@ -54,6 +68,15 @@ impl RadiosityBuffers {
     /// Keeps light without that of sharp lights apart from now on.
     pub fn keep_soft(&mut self) -> Result<()> {
         self.soft = Some(Buffer::zeros(self.merged.device(), "soft radiosity", self.merged.size_bytes)?);
+        Ok(())
+    }
+
+    /// Keeps the irradiances by these sharp lights from now on.
+    pub fn keep_irradiances(&mut self, lights: impl Iterator<Item = usize>) -> Result<()> {
+        let lights: Vec<usize> = lights.take(MOST_KEPT_LIGHTS).collect();
+        let size_bytes = lights.len() as u64 * self.merged.size_bytes / 4;
+        let buffer = Buffer::zeros(self.merged.device(), "irradiances", size_bytes)?;
+        self.irradiances = Some(Irradiances { buffer, lights });
         Ok(())
     }
 
@@ -91,6 +114,17 @@ impl RadiosityBuffers {
     pub fn bytes(&self, entity: usize, vertex_count: usize) -> std::ops::Range<u64> {
         let first = self.offsets[entity];
         first..first + 16 * vertex_count as u64
+    }
+
+    /// The irradiances by sharp lights, and by how many.
+    pub fn irradiances(&self) -> Option<(&Buffer, u32)> {
+        self.irradiances.as_ref().map(|kept| (&kept.buffer, kept.lights.len() as u32))
+    }
+
+    /// The first of a light's irradiances, if they are kept.
+    pub fn irradiance_first(&self, light: usize) -> Option<u32> {
+        let place = self.irradiances.as_ref()?.lights.binary_search(&light).ok()?;
+        Some((place as u64 * self.merged.size_bytes / 16) as u32)
     }
 
     /// All light but that of sharp lights.

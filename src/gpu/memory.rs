@@ -295,7 +295,7 @@ impl<'b> TexelView<'b> {
         match format {
             vk::Format::R32G32B32A32_SFLOAT | vk::Format::R32G32B32A32_UINT => 16,
             vk::Format::R16G16B16A16_SFLOAT | vk::Format::R32G32_UINT => 8,
-            vk::Format::R32_UINT => 4,
+            vk::Format::R32_UINT | vk::Format::R32_SFLOAT => 4,
             other => unreachable!("no texel view of format {other:?} is in use"),
         }
     }

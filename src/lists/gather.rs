@@ -119,14 +119,18 @@ pub fn gather(scope: &Scope<'_>, candidates: &Candidates, out: &mut Vec<u32>) ->
         if results.contains(&CullResult::Covers) {
             continue;
         }
+        let start = out.len();
         occlude(Some(entity), sharp, &|_| true, &results, out);
+        if sharp {
+            let occluders = (out.len() - start) as u32;
+            out.push(ListEntry::Sharp { entity, occluders }.pack());
+            sharp_count = out.len() - first;
+            continue;
+        }
         out.extend((0..channels).map(|channel| {
             let last = channel + 1 == channels;
             ListEntry::Shine { entity, channel: light.coloured.then_some(channel), last }.pack()
         }));
-        if sharp {
-            sharp_count = out.len() - first;
-        }
     }
     if let Some(sky) = scope.scene.sky {
         chain(None, false, sky, &mut results);

@@ -3,8 +3,8 @@
 //! SharpInputs: entities, clusters and the front of their lists (chains of sharp lights), silhouette fields, and
 //! vertices (position and normal, object frame, two quads each). A light is cut into parts
 //! ([`crate::field::sub_light`]); in each part the visibilities past all occluders are multiplied. Output: `radiosity`,
-//! as [`crate::merge`] has it, and albedo / pi times the irradiance of sharp lights. Where pixels read them, the fourth
-//! number is 1 on vertices that a shadow's edge comes near.
+//! as [`crate::merge`] has it, and albedo / pi times the irradiance of sharp lights. Where pixels evaluate lights, the
+//! fourth number holds marks (`glsl/marks.glsl`), and the irradiance by each light is kept.
 
 pub mod twin;
 
@@ -21,6 +21,7 @@ use crate::layout::{CLUSTER_FORMAT, CLUSTER_VERTICES, ENTRY_BITS, ENTRY_FORMAT};
 use crate::merge::variant::Reads;
 use crate::shaders::{Library, ShaderPermutation};
 use ash::vk;
+use bytemuck::{Pod, Zeroable};
 use std::sync::Arc;
 
 /// How near a shadow's edge must come to a vertex for pixels around it to evaluate lights, in steps to its neighbours:
@@ -203,6 +204,15 @@ pub struct SharpInputs<'b> {
     pub shown: Option<[&'b Buffer; 2]>,
     /// Where the shares go that lamps take of the view of all vertices, in the permutation that keeps them.
     pub lamps: Option<&'b Buffer>,
+    /// Where the irradiances of all vertices by sharp lights go, and by how many, in the permutation that finds edges.
+    pub irradiances: Option<(&'b Buffer, u32)>,
+}
+
+#[repr(C)]
+#[derive(Clone, Copy, Pod, Zeroable)]
+struct Push {
+    /// Lights whose irradiances are kept, and vertices of each.
+    kept: [u32; 2],
 }
 
 pub struct Sharp {
@@ -224,7 +234,8 @@ impl Sharp {
         radiosity: &'r Buffer,
         cluster_count: u32,
     ) -> Result<()> {
-        let SharpPermutation { reads, self_shadows, .. } = self.permutation;
+        let SharpPermutation { reads, self_shadows, edges, .. } = self.permutation;
+        let irradiances = inputs.irradiances.filter(|_| edges);
         let read = |buffer: &'r Buffer, format| Bind::read(reads == Reads::Texels, buffer, format);
         let quads = vk::Format::R32G32B32A32_SFLOAT;
         let resources = [
@@ -240,7 +251,13 @@ impl Sharp {
             inputs.shown.map_or(Bind::None, |[lights, _]| Bind::Buffer(lights)),
             inputs.shown.map_or(Bind::None, |[_, shares]| Bind::Buffer(shares)),
             inputs.lamps.map_or(Bind::None, Bind::Buffer),
+            irradiances.map_or(Bind::None, |(buffer, _)| Bind::Buffer(buffer)),
         ];
-        commands.dispatch(&self.pipeline, &resources, &(), [cluster_count * CLUSTER_VERTICES, 1, 1])
+        let elements = [cluster_count * CLUSTER_VERTICES, 1, 1];
+        let Some((_, lights)) = irradiances else {
+            return commands.dispatch(&self.pipeline, &resources, &(), elements);
+        };
+        let vertices = (radiosity.size_bytes / 16) as u32;
+        commands.dispatch(&self.pipeline, &resources, &Push { kept: [lights, vertices] }, elements)
     }
 }

@@ -42,7 +42,7 @@ fn entities_and_clusters_of_the_merge() {
             entry_count unused sharp_count self_first);
         same_layout!(reflection, Entity: centre alpha_beta gamma blocked_base radiance_base radial emission opacity
             shift albedo scale area_x area_y area_terms silhouette light_kind light_size light_ratio light_ramp
-            half_sides);
+            half_sides irradiance_first unused unused_pair);
     }
 }
 

@@ -156,6 +156,9 @@ fn pixels_carry_edges_that_vertices_do_not() {
     .concat();
     let near = "[[mesh]]\nname = \"lamp\"\nplane = { size_m = 0.5, cells = 1 }\n\
         [[entity]]\nmesh = \"lamp\"\nposition = [0.3, 0.4, 0.2]\nemission = [5, 5, 5]\nreceives = false\n";
+    let ring = (0..7).map(|i| (0.9 * i as f32).sin_cos());
+    let ring: String = ring.map(|(x, z)| lamp([2.0 * x, 2.4, 2.0 * z])).collect();
+    let ring = ring + &entity("ball", [0.0, 0.6, 0.0], "");
     let plane = "plane = { size_m = 6";
     let slab = "cuboid = { size_m = [6, 0.0001, 6]";
     for (name, rest, receiver, cells, share, least) in [
@@ -163,6 +166,7 @@ fn pixels_carry_edges_that_vertices_do_not() {
         ("a bulb", BALL_UNDER_BULB, plane, 12, 0.2, 0.004),
         ("a bulb on a slab", BALL_UNDER_BULB, slab, 12, 0.2, 0.004),
         ("two lamps and a wall", &wall, plane, 12, 0.2, 0.004),
+        ("seven lamps around a ball", &ring, plane, 12, 0.3, 0.004),
         ("a lamp that is near", near, plane, 8, 0.1, 0.01),
     ] {
         let show = |receiver: &str, cells: usize, shading| {

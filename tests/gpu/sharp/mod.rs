@@ -156,7 +156,7 @@ fn pixels_carry_edges_that_vertices_do_not() {
     .concat();
     let near = "[[mesh]]\nname = \"lamp\"\nplane = { size_m = 0.5, cells = 1 }\n\
         [[entity]]\nmesh = \"lamp\"\nposition = [0.3, 0.4, 0.2]\nemission = [5, 5, 5]\nreceives = false\n";
-    let ring = (0..7).map(|i| (0.9 * i as f32).sin_cos());
+    let ring = (0..7).map(|i| (0.9 * f64::from(i)).sin_cos());
     let ring: String = ring.map(|(x, z)| lamp([2.0 * x, 2.4, 2.0 * z])).collect();
     let ring = ring + &entity("ball", [0.0, 0.6, 0.0], "");
     let plane = "plane = { size_m = 6";

@@ -137,7 +137,8 @@ vec3 glossy(uint index, vec3 base, vec3 light, vec4 share, vec2 uv, float within
     vec3 turn_x = dFdx(view.normal), turn_y = dFdy(view.normal);
     view.footprint = (dot(turn_x, turn_x) + dot(turn_y, turn_y)) / (4.0 * PI);
     // Loops are tested at their ends, as in the merge. What is NONE has no share.
-    float least = LEAST_HIGHLIGHT * dot(light + f0 * found.facing + found.grazing, vec3(1.0));
+    vec3 besides = diffuse_share(view.z, metallic, entity.f0) * light + f0 * found.facing + found.grazing;
+    float least = LEAST_HIGHLIGHT * dot(besides, vec3(1.0));
     uint i = 0;
     do {
         // A software device evaluates a highlight for each turn of the loop that evaluates any.

@@ -143,9 +143,11 @@ float most_light(View view, vec3 to, Entity shining, float f0) {
     // The half vector of the light's rim lies no farther off than half as far as the rim.
     float nearest = max(across - sine, 0.0) / (min(half_z + sine, 2.0) * view.alpha);
     float lowest = max(half_z - sine, 0.0);
+    // Slopes stretch where the half vector is nearer to the horizon than the light is to it.
     float radius = sine / max(lowest * view.alpha, 1e-6);
+    float stretch = max(0.5 * (size + sine) * (size + sine) / max(lowest, 1e-6), 1.0);
     float spread = 1.0 + nearest * nearest;
-    float share = min((radius * radius + view.footprint / (view.alpha * view.alpha)) / (spread * spread), 1.0);
+    float share = min((stretch * radius * radius + view.footprint / (view.alpha * view.alpha)) / (spread * spread), 1.0);
     float lit = clamp(dot(view.normal, toward) + sine, 0.0, 1.0);
     float term = schlick(max(0.5 * size - sine, 0.0));
     return lowest > 0.3 ? (f0 + term) * share * 4.0 * size / lowest * masking(view, lit) * lit : lit * EVERYTHING;

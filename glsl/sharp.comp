@@ -24,7 +24,7 @@ READ_UVEC2(7, SelfCells, self_cells, self_cell)
 #define FACINGS 1
 #if EDGES
 #define KEEPS 1
-layout(std430, binding = 12) buffer Irradiances { float irradiances[]; }; // of all vertices by one light after another
+layout(std430, binding = 12) buffer Irradiances { uint irradiances[]; }; // bits of floats, of all vertices by one light after another
 layout(push_constant) uniform Push {
     uint kept_lights;
     uint all_vertices;
@@ -63,7 +63,7 @@ void main() {
     vec3 soft = sum.rgb;
     kept_vertex = cluster.radiosity_first + v;
     for (uint l = 0; l < push.kept_lights; l++) {
-        irradiances[l * push.all_vertices + kept_vertex] = 0.0;
+        irradiances[l * push.all_vertices + kept_vertex] = 0;
     }
 #endif
 #if SHOWN

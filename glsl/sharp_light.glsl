@@ -29,24 +29,20 @@ void note_share(uint light, float irradiance) {
 float lamps = 0.0; // share of the cosine-weighted view that lamps take, which light that leaves cannot pass
 #endif
 
-#if KEEPS
-const float KEPT_SCALE = 4096.0; // of irradiances that halves hold
-const float LEAST_KEPT = 1e-4 / KEPT_SCALE;
-#endif
-
 #if EDGES
 // Vertices, and pixels that are evaluated for their neighbours too, carry a shadow's edge badly where its penumbra is
 // narrow against the distance to the next. The error grows with the square of that distance over the penumbra's width,
 // and with the light that the shadow takes away. They carry the light around a lamp badly that is as near as the next.
 float finest;       // distance over width, for the narrowest penumbra of the current light that comes as near as the next vertex, or 0
 float missed = 0.0; // most, over all lights, of the square of `finest` times the light
-float open_light = 0.0; // of all lights, nothing between
+float open_light = 0.0; // of all lights: nothing between, or what arrives of those that are blended
 float curved;       // irradiance by the current light, each part's by the square of the step over its distance, of radiance 1
 
 // What vertices may miss of a light on a surface that sends out `soft` light besides that of all lights.
 float tolerable_miss(vec3 albedo, vec3 soft) {
-    float besides = dot(soft, vec3(1.0)) / max(dot(albedo, vec3(1.0)), 1e-30);
-    return (open_light + besides) / (EDGE_STEPS * EDGE_STEPS);
+    float white = dot(albedo, vec3(1.0));
+    float all = white > 0.0 ? open_light + dot(soft, vec3(1.0)) / white : EVERYTHING;
+    return all / (EDGE_STEPS * EDGE_STEPS);
 }
 
 #include "marks.glsl"
@@ -158,30 +154,35 @@ float add_open(float irradiance, float cone, Entity shining) {
 #endif
 
 #if KEEPS
-// Keeps the irradiance by a light of radiance 1 for pixels around the vertex, as two halves with what vertices miss of it,
-// until all lights are known.
+const float LEAST_KEPT = 1e-30; // of what is not dark
+
+// Keeps the irradiance by a light of radiance 1 for pixels around the vertex. Until all lights are known, its last bits
+// hold what vertices miss of it, in sixteenths of an octave, 0 for nothing.
+const uint MISS_BITS = 0xfffu;
+const float LEAST_OCTAVE = -110.0;
+
 void keep(Entity shining, float irradiance, float miss) {
     if (shining.irradiance_first != NONE) {
-        vec2 kept = vec2(min(irradiance * KEPT_SCALE, 65504.0), log2(max(miss, 1e-30)));
-        irradiances[shining.irradiance_first + kept_vertex] = uintBitsToFloat(packHalf2x16(kept));
+        float sixteenths = clamp(16.0 * (log2(max(miss, 1e-30)) - LEAST_OCTAVE), 1.0, float(MISS_BITS));
+        uint code = miss > 0.0 ? uint(sixteenths) : 0;
+        irradiances[shining.irradiance_first + kept_vertex] = floatBitsToUint(irradiance) & ~MISS_BITS | code;
     }
 }
 
 // Once all lights are known: what is kept becomes the irradiance, below zero where pixels need to evaluate the light.
 void settle_kept(float tolerable) {
     for (uint l = 0; l < push.kept_lights; l++) {
-        uint at = l * push.all_vertices + kept_vertex;
-        vec2 kept = unpackHalf2x16(floatBitsToUint(irradiances[at]));
-        float irradiance = kept.x / KEPT_SCALE;
-        bool needed = kept != vec2(0.0) && exp2(kept.y) > tolerable;
-        irradiances[at] = needed ? -max(irradiance, 1e-30) : irradiance;
+        uint at = l * push.all_vertices + kept_vertex, kept = irradiances[at], code = kept & MISS_BITS;
+        bool needed = code > 0 && exp2(float(code) / 16.0 + LEAST_OCTAVE) > tolerable;
+        float irradiance = uintBitsToFloat(kept & ~MISS_BITS);
+        irradiances[at] = floatBitsToUint(needed ? -max(irradiance, LEAST_KEPT) : irradiance);
     }
 }
 #endif
 
 #if BLENDS
 // Irradiance by a light of radiance 1 between the vertices of a pixel's triangle. Returns whether they carry it well:
-// none of them needs pixels to evaluate it, and they see it all or none of them does.
+// none of them needs pixels to evaluate it, and it is dark for all of them or for none.
 bool blended_irradiance(Entity shining, out float irradiance) {
     bool is_kept = shining.irradiance_first != NONE;
     uvec3 at = lit_vertices + (is_kept ? shining.irradiance_first : 0);
@@ -547,6 +548,14 @@ vec3 chain_sum(Surface surface, uint i, uint end) {
         }
     } while (is_kind(packed, ENTRY_GLOBE));
 #endif
+#if KEEPS
+    float passed = 0.0;
+    b = first_block;
+    do {
+        passed += dot(shares[b], vec4(1.0));
+        b++;
+    } while (b <= last_block);
+#endif
 #if OUTLINES
     // Of a light with an outline of its own, as much of each part shines as the outline covers.
     b = first_block;
@@ -595,11 +604,7 @@ vec3 chain_sum(Surface surface, uint i, uint end) {
     irradiance *= over_parts(surface, light);
 #endif
 #if KEEPS
-    bool dark = irradiance <= 0.001 * unblocked && unblocked > 0.0;
-#if COLORS
-    miss = has_colors ? EVERYTHING : miss;
-#endif
-    // What is not dark is kept as more than nothing.
+    bool dark = passed <= 0.001 * unblocked && unblocked > 0.0;
     keep(shining, dark ? 0.0 : max(irradiance * cone, LEAST_KEPT), miss);
 #endif
 #if LAMPS

@@ -26,9 +26,10 @@ const FLAT_TOLERANCE: f64 = 1e-5;
 /// files.
 const VERTEX_NOISE: f64 = 5e-7;
 
-/// Depth of the dents that a convex body may have, relative to its bounding radius or, where that is more, to the farthest
-/// coordinate: the balls that modelling programs make have dents of 6e-7.
-const DENT: f64 = 2e-6;
+/// Depth of the dents that a convex body may have, relative to its bounding radius: the balls that modelling programs make
+/// have dents of 6e-7. The second is relative to its farthest coordinate, whose rounding dents a body that stands far from
+/// the origin, but no more than the third, of the radius again.
+const DENTS: [f64; 3] = [2e-6, 4e-7, 1e-3];
 
 /// Steps of a full turn in which sides around an edge are told apart.
 const ANGLE_STEPS: f64 = 4096.0;
@@ -56,11 +57,13 @@ pub fn shape(positions: &[Vec3], triangles: &[[u32; 3]], centre: Vec3, radius_m:
         && fan_count(&edges, corners.len()) == vertex_count
         && volume_m3(positions, triangles, centre) > VERTEX_NOISE * f64::from(radius_m).powi(3);
     let solid = closed && has_solid_pieces(&edges, positions, triangles, centre);
-    let farthest = positions.iter().fold(radius_m, |most, p| most.max(p.abs().max_element()));
+    let radius = f64::from(radius_m);
+    let farthest = positions.iter().fold(0.0_f32, |most, p| most.max(p.abs().max_element()));
+    let dent_m = (DENTS[0] * radius).max((DENTS[1] * f64::from(farthest)).min(DENTS[2] * radius));
     let convex = closed
         && euler_characteristic == 2
         && pieces(&edges, triangles.len()).count == 1
-        && edges.iter().all(|e| bends_outwards(e, positions, triangles, DENT * f64::from(farthest)));
+        && edges.iter().all(|e| bends_outwards(e, positions, triangles, dent_m));
     Topology { closed, solid, convex, plane: plane(positions, f64::from(radius_m)), euler_characteristic }
 }
 

@@ -162,7 +162,10 @@ impl Frame {
         let sharp = permutation::sharp(&options, &permutation, &methods, &scene, &buffers);
         if sharp.is_some() {
             radiosity.keep_soft()?;
-            let is_kept = |light: &usize| scene.entities[*light].emits && methods[*light].is_sharp();
+            // Pixels evaluate lights of several colours wherever they evaluate any.
+            let has_colors = |light: usize| scene.meshes[scene.entities[light].mesh].colors.is_some();
+            let is_kept =
+                |&light: &usize| scene.entities[light].emits && methods[light].is_sharp() && !has_colors(light);
             radiosity.keep_irradiances((0..scene.entities.len()).filter(is_kept))?;
         }
         let threads = if device.info.is_software() { gpu::driver_threads() } else { 1 };

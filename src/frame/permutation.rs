@@ -9,7 +9,6 @@ use crate::merge::variant::{MergePermutation, Variant};
 use crate::scene::{LightMethod, Scene};
 use crate::scene_buffers::SceneBuffers;
 use crate::sharp::SharpPermutation;
-use ash::vk;
 
 /// The permutation with its variant less the texel views or uniform blocks that cannot hold the scene.
 pub(super) fn usable(
@@ -84,9 +83,7 @@ pub(super) fn pixel_shading(
     sharp: Option<SharpPermutation>,
 ) -> Option<SharpPermutation> {
     let [nodes, cells, _] = buffers.sharp();
-    let (irradiances, _) = radiosity.irradiances()?;
-    let fits = SharpPermutation::fits_views(device, [nodes, cells, radiosity.soft()])
-        && TexelView::fits(device, vk::Format::R32_SFLOAT, irradiances.size_bytes);
+    let fits = SharpPermutation::fits_views(device, [nodes, cells, radiosity.soft()]);
     sharp.filter(|_| options.shades_pixels() && fits)
 }
 

@@ -8,7 +8,7 @@ use crate::scene::Scene;
 use crate::scene_buffers::SceneBuffers;
 use std::sync::Arc;
 
-/// Four floats a vertex: linear RGB radiance that leaves the surface, and 0. The vertices of one entity follow those of
+/// Four floats a vertex: linear RGB radiance that leaves the surface, and marks (`glsl/marks.glsl`) or 0. The vertices of one entity follow those of
 /// another, each in the order of its mesh's [`crate::scene_buffers::DeviceMesh`].
 pub(super) struct RadiosityBuffers {
     pub merged: Buffer,
@@ -71,11 +71,16 @@ impl RadiosityBuffers {
         Ok(())
     }
 
-    /// Keeps the irradiances by these sharp lights from now on.
+    /// Keeps the irradiances by these sharp lights from now on, or by as many of them as the device can bind at once.
     pub fn keep_irradiances(&mut self, lights: impl Iterator<Item = usize>) -> Result<()> {
-        let lights: Vec<usize> = lights.take(MOST_KEPT_LIGHTS).collect();
-        let size_bytes = lights.len() as u64 * self.merged.size_bytes / 4;
-        let buffer = Buffer::zeros(self.merged.device(), "irradiances", size_bytes)?;
+        let device = self.merged.device();
+        let limits = &device.limits;
+        let bound = limits.max_texel_buffer_elements.min(limits.max_storage_buffer_range / 4);
+        let vertices = self.merged.size_bytes / 16;
+        let most = (u64::from(bound) / vertices) as usize;
+        let lights: Vec<usize> = lights.take(most.min(MOST_KEPT_LIGHTS)).collect();
+        let size_bytes = (lights.len() as u64 * 4 * vertices).max(4);
+        let buffer = Buffer::zeros(device, "irradiances", size_bytes)?;
         self.irradiances = Some(Irradiances { buffer, lights });
         Ok(())
     }

@@ -79,7 +79,8 @@ pub struct SharpPermutation {
     /// Whether every point leaves out the occluders of its lists that stand outside a light's cone. It saves a quarter
     /// of the time or more in scenes of several sharp lights, and costs a fifth under one light.
     pub cones: bool,
-    /// Whether vertices that a shadow's edge comes near are marked, for pixels that evaluate lights there.
+    /// Whether vertices that a shadow's edge comes near are marked, and their irradiance by each light is kept, for pixels
+    /// that evaluate lights there.
     pub edges: bool,
     /// Whether loops over parts and maps stay loops: on SwiftShader, which takes over 250 s and 8 GB to compile them
     /// unrolled.
@@ -212,7 +213,8 @@ pub struct SharpInputs<'b> {
 #[derive(Clone, Copy, Pod, Zeroable)]
 struct Push {
     /// Lights whose irradiances are kept, and vertices of each.
-    kept: [u32; 2],
+    kept_lights: u32,
+    all_vertices: u32,
 }
 
 pub struct Sharp {
@@ -254,10 +256,10 @@ impl Sharp {
             irradiances.map_or(Bind::None, |(buffer, _)| Bind::Buffer(buffer)),
         ];
         let elements = [cluster_count * CLUSTER_VERTICES, 1, 1];
-        let Some((_, lights)) = irradiances else {
+        let Some((_, kept_lights)) = irradiances else {
             return commands.dispatch(&self.pipeline, &resources, &(), elements);
         };
-        let vertices = (radiosity.size_bytes / 16) as u32;
-        commands.dispatch(&self.pipeline, &resources, &Push { kept: [lights, vertices] }, elements)
+        let all_vertices = (radiosity.size_bytes / 16) as u32;
+        commands.dispatch(&self.pipeline, &resources, &Push { kept_lights, all_vertices }, elements)
     }
 }

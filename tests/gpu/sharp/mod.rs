@@ -139,8 +139,8 @@ fn picture(gpu: &Gpu, scene: &Scene, shading: Shading) -> (Vec<f32>, Option<u64>
 }
 
 /// On floors and slabs of few cells pixels show what the vertices of a fine floor show, and the coarse ones' own
-/// vertices do not: pixels carry the rims of shadows and spots, tell the states of two lamps and their occluders apart,
-/// and are lit by a lamp that is near.
+/// vertices do not: pixels carry the rims of shadows and spots, tell lamps and their occluders apart, and are lit by a
+/// lamp that is near.
 #[test]
 fn pixels_carry_edges_that_vertices_do_not() {
     let Some(gpu) = gpu() else { return };
@@ -159,6 +159,8 @@ fn pixels_carry_edges_that_vertices_do_not() {
     let ring = (0..7).map(|i| (0.9 * f64::from(i)).sin_cos());
     let ring: String = ring.map(|(x, z)| lamp([2.0 * x, 2.4, 2.0 * z])).collect();
     let ring = ring + &entity("ball", [0.0, 0.6, 0.0], "");
+    let sun = "[environment]\nsun = { toward = [1, 0.15, 0.2], angle_deg = 0.02, radiance = [2e7, 2e7, 2e7] }\n";
+    let low_sun = format!("{BALL_UNDER_BULB}{sun}");
     let plane = "plane = { size_m = 6";
     let slab = "cuboid = { size_m = [6, 0.0001, 6]";
     for (name, rest, receiver, cells, share, least) in [
@@ -167,6 +169,7 @@ fn pixels_carry_edges_that_vertices_do_not() {
         ("a bulb on a slab", BALL_UNDER_BULB, slab, 12, 0.2, 0.004),
         ("two lamps and a wall", &wall, plane, 12, 0.2, 0.004),
         ("seven lamps around a ball", &ring, plane, 12, 0.3, 0.004),
+        ("a bulb beside a faint sun that is low", &low_sun, plane, 12, 0.2, 0.004),
         ("a lamp that is near", near, plane, 8, 0.1, 0.01),
     ] {
         let show = |receiver: &str, cells: usize, shading| {

@@ -173,7 +173,7 @@ void keep(Entity shining, float irradiance, float miss) {
 void settle_kept(float tolerable) {
     for (uint l = 0; l < push.kept_lights; l++) {
         uint at = l * push.all_vertices + kept_vertex, kept = irradiances[at], code = kept & MISS_BITS;
-        bool needed = code > 0 && exp2(float(code) / 16.0 + LEAST_OCTAVE) > tolerable;
+        bool needed = code > 0 && exp2(float(code) / 16.0 + LEAST_OCTAVE) > BLENDED_MISS * tolerable;
         float irradiance = uintBitsToFloat(kept & ~MISS_BITS);
         irradiances[at] = floatBitsToUint(needed ? -max(irradiance, LEAST_KEPT) : irradiance);
     }

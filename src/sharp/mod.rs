@@ -35,6 +35,11 @@ const PIXEL_EDGE_REACH: f64 = 1.2;
 /// with the light and with the inverse square of the width. Pictures then differ by at most 0.0018 relative RMS from
 /// pictures whose pixels evaluate every edge.
 const EDGE_STEPS: f64 = 1.1;
+/// Share of what vertices may miss of all lights that they may miss of one that pixels blend beside those which they
+/// evaluate: several of those add up. With 1 a gallery of 20 lamps has 0.0022 more FLIP, with this 0.0005, and its pixels
+/// take a tenth longer.
+const BLENDED_MISS: f64 = 0.25;
+
 /// Steps in the width of the narrowest penumbra, of which the square is far from overflow.
 const MOST_STEPS: f64 = 1e4;
 
@@ -147,6 +152,7 @@ impl SharpPermutation {
             ("BALL_WIDER", BALL_WIDER),
             ("EDGE_STEPS", EDGE_STEPS),
             ("MOST_STEPS", MOST_STEPS),
+            ("BLENDED_MISS", BLENDED_MISS),
             ("NEAR_LIGHT", (NEAR_LIGHT_STEPS / EDGE_STEPS).powi(2)),
             ("MOST_SINE", MOST_SINE),
             ("LIMIT_SINE", LIMIT_SINE),

@@ -11,6 +11,21 @@
 
 const uint BLOCKS = 5; // of a light: the whole, and its quarters
 
+// What is of one block. SwiftShader takes wrong ones where lanes ask for different places of an array.
+vec4 of_block(vec4 all[BLOCKS], uint b) {
+    vec4 found = all[0];
+    [[unroll]] for (uint k = 1; k < BLOCKS; k++) {
+        found = k == b ? all[k] : found;
+    }
+    return found;
+}
+
+void set_block(inout vec4 all[BLOCKS], uint b, vec4 value) {
+    [[unroll]] for (uint k = 0; k < BLOCKS; k++) {
+        all[k] = k == b ? value : all[k];
+    }
+}
+
 #if SHOWN || PANELS
 float open_share; // irradiance by the current light's parts with nothing between, of radiance 1
 #endif
@@ -462,9 +477,10 @@ vec3 chain_sum(Surface surface, uint i, uint end) {
     // Loops are tested at their ends, as in the merge.
     uint b = first_block;
     do {
-        shares[b] = part_shares(surface, light, block_of(light, b));
+        vec4 share = part_shares(surface, light, block_of(light, b));
+        set_block(shares, b, share);
 #if EDGES
-        unblocked += dot(shares[b], vec4(1.0));
+        unblocked += dot(share, vec4(1.0));
 #endif
         b++;
     } while (b <= last_block);
@@ -478,7 +494,7 @@ vec3 chain_sum(Surface surface, uint i, uint end) {
             finest = 0.0;
 #endif
             vec4 free = let_through(ENTITY(packed & SKY_CHAIN), surface, light, block_of(light, b), true);
-            shares[b] *= free;
+            set_block(shares, b, free * of_block(shares, b));
 #if EDGES
             note_occluder(packed, free, b, covered, nearest);
 #endif
@@ -505,7 +521,7 @@ vec3 chain_sum(Surface surface, uint i, uint end) {
             i = next_entry(surface, i + 1);
             packed = entry_at(i);
             if (!is_kind(packed, ENTRY_SHEET)) {
-                shares[b] *= shadow.free;
+                set_block(shares, b, shadow.free * of_block(shares, b));
                 shadow = no_shadow();
                 i = b < last_block ? sheets : i;
                 packed = entry_at(i);
@@ -525,7 +541,7 @@ vec3 chain_sum(Surface surface, uint i, uint end) {
             finest = 0.0;
 #endif
             vec4 free = past_cuboid(ENTITY(packed & SKY_CHAIN), surface, light, block_of(light, b));
-            shares[b] *= free;
+            set_block(shares, b, free * of_block(shares, b));
 #if EDGES
             note_occluder(packed, free, b, covered, nearest);
 #endif
@@ -552,7 +568,7 @@ vec3 chain_sum(Surface surface, uint i, uint end) {
     float passed = 0.0;
     b = first_block;
     do {
-        passed += dot(shares[b], vec4(1.0));
+        passed += dot(of_block(shares, b), vec4(1.0));
         b++;
     } while (b <= last_block);
 #endif
@@ -561,7 +577,8 @@ vec3 chain_sum(Surface surface, uint i, uint end) {
     b = first_block;
     do {
         if (shining.light_kind == LIGHT_OUTLINE) {
-            shares[b] *= 1.0 - let_through(shining, surface, light, block_of(light, b), false);
+            vec4 dark = let_through(shining, surface, light, block_of(light, b), false);
+            set_block(shares, b, (1.0 - dark) * of_block(shares, b));
             b++;
         }
     } while (shining.light_kind == LIGHT_OUTLINE && b <= last_block);
@@ -575,13 +592,14 @@ vec3 chain_sum(Surface surface, uint i, uint end) {
 #endif
     b = first_block;
     do {
-        irradiance += shines * dot(shares[b], vec4(1.0));
+        vec4 share = of_block(shares, b);
+        irradiance += shines * dot(share, vec4(1.0));
 #if COLORS
         Block block = block_of(light, b);
         EACH for (uint k = 0; k < 4; k++) {
             vec2 place = part_place(light, block, k);
             vec3 factor = max(vec4(place.x * across + place.y * down, 1.0) * colors, 0.0);
-            colored += shines * shares[b][k] * factor;
+            colored += shines * share[k] * factor;
         }
 #endif
         b++;

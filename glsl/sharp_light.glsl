@@ -11,7 +11,9 @@
 
 const uint BLOCKS = 5; // of a light: the whole, and its quarters
 
-// What is of one block. SwiftShader takes wrong ones where lanes ask for different places of an array.
+// What is of one block. SwiftShader takes wrong elements of an array where lanes ask for different ones; on lavapipe lanes
+// that leave a loop before others lose what no array holds.
+#if ROLLED
 vec4 of_block(vec4 all[BLOCKS], uint b) {
     vec4 found = all[0];
     [[unroll]] for (uint k = 1; k < BLOCKS; k++) {
@@ -25,6 +27,10 @@ void set_block(inout vec4 all[BLOCKS], uint b, vec4 value) {
         all[k] = k == b ? value : all[k];
     }
 }
+#else
+#define of_block(all, b) all[b]
+#define set_block(all, b, value) all[b] = value
+#endif
 
 #if SHOWN || PANELS
 float open_share; // irradiance by the current light's parts with nothing between, of radiance 1

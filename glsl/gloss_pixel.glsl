@@ -21,6 +21,13 @@ layout(location = 10) centroid in vec4 shares;
 #include "mirror.glsl"
 #endif
 
+#if HIGHLIGHTS
+// One of the lights that highlights are of; any where there are fewer, which has no share.
+Entity highlight_light(GlossEntity entity, uint i) {
+    return ENTITY(entity.lights[i] == NONE ? 0 : entity.lights[i]);
+}
+#endif
+
 #if TEXTURED
 layout(binding = GLOSS_BINDING + 5) uniform sampler2D gloss_picture;  // green: roughness, blue: metal
 layout(binding = GLOSS_BINDING + 6) uniform sampler2D normal_picture; // in tangent space
@@ -50,7 +57,7 @@ vec3 open_light(GlossEntity entity, vec3 n, vec3 ground, vec3 place, vec3 bounce
 #if HIGHLIGHTS
     uint i = 0;
     do {
-        Entity shining = ENTITY(entity.lights[i] == NONE ? 0 : entity.lights[i]);
+        Entity shining = highlight_light(entity, i);
         SeenLight light = seen_light(shining.centre.xyz - entity.eye - place, shining);
         vec3 along = along_axes(light, vec2(0.0));
         float facing = dot(mat3(light.toward, light.across, light.down) * along, n);
@@ -136,7 +143,7 @@ vec3 glossy(uint index, vec3 base, vec3 light, vec4 share, vec2 uv, float within
     // A disc of half of a pixel's area.
     vec3 turn_x = dFdx(view.normal), turn_y = dFdy(view.normal);
     view.footprint = (dot(turn_x, turn_x) + dot(turn_y, turn_y)) / (4.0 * PI);
-    // Loops are tested at their ends, as in the merge. What is NONE has no share.
+    // Loops are tested at their ends, as in the merge.
     vec3 besides = diffuse_share(view.z, metallic, entity.f0) * light + f0 * found.facing + found.grazing;
     float least = LEAST_HIGHLIGHT * dot(besides, vec3(1.0));
     uint i = 0;
@@ -144,14 +151,14 @@ vec3 glossy(uint index, vec3 base, vec3 light, vec4 share, vec2 uv, float within
         // A software device evaluates a highlight for each turn of the loop that evaluates any.
         bool faint;
         do {
-            Entity shining = ENTITY(entity.lights[i] == NONE ? 0 : entity.lights[i]);
+            Entity shining = highlight_light(entity, i);
             vec3 to = shining.centre.xyz - entity.eye - from_eye;
             float most = most_light(view, to, shining, max(f0.x, max(f0.y, f0.z)));
             faint = share[i] * most * dot(shining.emission, vec3(1.0)) <= least;
             i += faint ? 1 : 0;
         } while (faint && i < entity.light_count);
         if (i < entity.light_count) {
-            Entity shining = ENTITY(entity.lights[i] == NONE ? 0 : entity.lights[i]);
+            Entity shining = highlight_light(entity, i);
             vec2 part = share[i] * reflect_light(view, shining.centre.xyz - entity.eye - from_eye, shining);
             found.facing += part.x * shining.emission;
             found.grazing += part.y * shining.emission;

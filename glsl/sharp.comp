@@ -24,7 +24,8 @@ READ_UVEC2(7, SelfCells, self_cells, self_cell)
 #define FACINGS 1
 #if EDGES
 #define KEEPS 1
-layout(std430, binding = 12) buffer Irradiances { uint irradiances[]; }; // bits of floats, of all vertices by one light after another
+// Bits of floats, of all vertices by one light after another.
+layout(std430, binding = 12) buffer Irradiances { uint irradiances[]; };
 layout(push_constant) uniform Push {
     uint kept_lights;
     uint all_vertices;

@@ -415,7 +415,6 @@ bool has_outline(uint packed) {
     return is_kind(packed, 0);
 }
 
-#if CONES
 // Whether the ball of an entry's occluder reaches into the cone around all parts of its chain's light, as far as the
 // light.
 bool may_block(uint packed, Surface surface) {
@@ -439,21 +438,17 @@ bool may_block(uint packed, Surface surface) {
     return along > -radius && along - radius < distance + 1.0 / shining.w
         && off * sqrt(1.0 - sine * sine) - max(along, 0.0) * sine < radius;
 }
-#endif
 
-// The first entry of a chain from `i` on that has to be evaluated: with CONES an occluder that may block, or the light;
-// without CONES any.
+// The first entry of a chain from `i` on that has to be evaluated: an occluder that may block, or the light.
 // Values of this loop are read again behind it: on lavapipe a lane that leaves a loop early may lose what the loop does
 // not carry.
 uint next_entry(Surface surface, uint i) {
-#if CONES
     bool passes = false;
     do {
         uint packed = entry_at(i);
         passes = (packed & ENTRY_LIGHT) == 0 && !may_block(packed, surface);
         i += passes ? 1 : 0;
     } while (passes);
-#endif
     return i;
 }
 

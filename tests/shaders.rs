@@ -89,7 +89,6 @@ fn sharp() -> Vec<ShaderPermutation> {
             gloss: on(0),
             lamps: on(0),
             self_shadows: on(4),
-            cones: on(5),
             edges: on(0) == on(2),
             rolled: on(5),
         }
@@ -115,7 +114,6 @@ fn drawing() -> Vec<ShaderPermutation> {
         gloss: outlines,
         lamps: false,
         self_shadows: true,
-        cones: outlines,
         edges: true,
         rolled: outlines,
     });

@@ -57,14 +57,18 @@ pub fn shape(positions: &[Vec3], triangles: &[[u32; 3]], centre: Vec3, radius_m:
         && fan_count(&edges, corners.len()) == vertex_count
         && volume_m3(positions, triangles, centre) > VERTEX_NOISE * f64::from(radius_m).powi(3);
     let solid = closed && has_solid_pieces(&edges, positions, triangles, centre);
-    let radius = f64::from(radius_m);
-    let farthest = positions.iter().fold(0.0_f32, |most, p| most.max(p.abs().max_element()));
-    let dent_m = (DENTS[0] * radius).max((DENTS[1] * f64::from(farthest)).min(DENTS[2] * radius));
+    let dent_m = deepest_dent_m(positions, f64::from(radius_m));
     let convex = closed
         && euler_characteristic == 2
         && pieces(&edges, triangles.len()).count == 1
         && edges.iter().all(|e| bends_outwards(e, positions, triangles, dent_m));
     Topology { closed, solid, convex, plane: plane(positions, f64::from(radius_m)), euler_characteristic }
+}
+
+/// Depth of the dents that a convex body of these vertices may have, see [`DENTS`].
+fn deepest_dent_m(positions: &[Vec3], radius_m: f64) -> f64 {
+    let farthest = positions.iter().fold(0.0_f32, |most, p| most.max(p.abs().max_element()));
+    (DENTS[0] * radius_m).max((DENTS[1] * f64::from(farthest)).min(DENTS[2] * radius_m))
 }
 
 /// A few triangles of many by themselves: the positions of their corners, three a triangle.

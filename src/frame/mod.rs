@@ -178,7 +178,7 @@ impl Frame {
             lists.set_near(std::mem::take(&mut near[index]), 2.0 * buffers.surface(index).reach_m);
         }
         let sharp = sharp.map(|wanted| wanted.fitting(device, buffers.sharp(), radiosity.soft()));
-        let pixels = pixel_shading(device, &options, &buffers, &radiosity, sharp);
+        let pixels = pixel_shading(device, &options, &buffers, radiosity.soft(), sharp);
         if options.shading == Some(Shading::Pixel) && sharp.is_some() && pixels.is_none() {
             log::warn!(
                 "no pixel evaluates lights: the device's texel buffers cannot hold the silhouette fields or the light of all vertices"

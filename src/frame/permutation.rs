@@ -1,9 +1,8 @@
 //! Permutations of a scene's passes: the options, restricted to features of the scene and limits of the device.
 
 use super::Options;
-use super::radiosity::RadiosityBuffers;
 use crate::field::silhouette::SilhouetteField;
-use crate::gpu::{Device, TexelView};
+use crate::gpu::{Buffer, Device, TexelView};
 use crate::layout::{DeviceEntity, QUAD_FORMAT};
 use crate::merge::variant::{MergePermutation, Variant};
 use crate::scene::{LightMethod, Scene};
@@ -33,10 +32,6 @@ pub(super) fn usable(
     MergePermutation { variant, ..permutation }
 }
 
-/// Occluders of one light that are evaluated faster than it is found out which of them may block. A room of 27 draws in
-/// 0.9 s where all are evaluated in 2.6 s; a torus over a floor takes 5 % longer if they are told apart.
-const FEW_CASTERS: usize = 6;
-
 /// The permutation of the pass of sharp lights beside that merge; `None` where no light is sharp.
 pub(super) fn sharp(
     options: &Options,
@@ -50,7 +45,6 @@ pub(super) fn sharp(
     let any_field = |wanted: fn(&SilhouetteField) -> bool| {
         buffers.meshes.iter().any(|mesh| mesh.slots.silhouette.as_ref().is_some_and(|slot| wanted(&slot.content)))
     };
-    let casters = scene.entities.iter().filter(|entity| entity.occludes).count();
     (!lights.is_empty()).then(|| SharpPermutation {
         reads: merge.variant.reads,
         entity_limit: merge.entity_limit,
@@ -65,7 +59,6 @@ pub(super) fn sharp(
         globes: (0..scene.entities.len()).any(|entity| scene.is_globe(entity)),
         gloss: merge.gloss,
         self_shadows: buffers.has_self_shadows(),
-        cones: lights.len() > 1 || casters > FEW_CASTERS,
         edges: false,
         lamps: false,
         rolled: false,
@@ -79,12 +72,11 @@ pub(super) fn pixel_shading(
     device: &Device,
     options: &Options,
     buffers: &SceneBuffers,
-    radiosity: &RadiosityBuffers,
+    soft: &Buffer,
     sharp: Option<SharpPermutation>,
 ) -> Option<SharpPermutation> {
     let [nodes, cells, _] = buffers.sharp();
-    let fits = SharpPermutation::fits_views(device, [nodes, cells, radiosity.soft()]);
-    sharp.filter(|_| options.shades_pixels() && fits)
+    sharp.filter(|_| options.shades_pixels() && SharpPermutation::fits_views(device, [nodes, cells, soft]))
 }
 
 /// Whether any light of the scene meets the chains of the merge. The sky does in any case.

@@ -116,7 +116,7 @@ impl Frame {
     /// What makes pictures with these options.
     fn draw(&self, options: &Options) -> Result<Draw> {
         let sharp = self.sharp.as_ref().map(|sharp| sharp.permutation);
-        let pixels = pixel_shading(&self.device, options, &self.buffers, &self.radiosity, sharp);
+        let pixels = pixel_shading(&self.device, options, &self.buffers, self.radiosity.soft(), sharp);
         let lights = self.reflectors.lights(pixels, sharp);
         Draw::new(&self.device, &self.library, options.size, options.antialias, lights)
     }

@@ -8,8 +8,8 @@ use crate::scene::Scene;
 use crate::scene_buffers::SceneBuffers;
 use std::sync::Arc;
 
-/// Four floats a vertex: linear RGB radiance that leaves the surface, and marks (`glsl/marks.glsl`) or 0. The vertices of one entity follow those of
-/// another, each in the order of its mesh's [`crate::scene_buffers::DeviceMesh`].
+/// Four floats a vertex: linear RGB radiance that leaves the surface, and marks (`glsl/marks.glsl`) or 0. The vertices of
+/// one entity follow those of another, each in the order of its mesh's [`crate::scene_buffers::DeviceMesh`].
 pub(super) struct RadiosityBuffers {
     pub merged: Buffer,
     /// Light without that of sharp lights, in a scene that has any: what the merge writes then.

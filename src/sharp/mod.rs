@@ -35,6 +35,7 @@ const PIXEL_EDGE_REACH: f64 = 1.2;
 /// with the light and with the inverse square of the width. Pictures then differ by at most 0.0018 relative RMS from
 /// pictures whose pixels evaluate every edge.
 const EDGE_STEPS: f64 = 1.1;
+
 /// Share of what vertices may miss of all lights that they may miss of one that pixels blend beside those which they
 /// evaluate: several of those add up. With 1 a gallery of 20 lamps has 0.0022 more FLIP, with this 0.0005, and its pixels
 /// take a tenth longer.
@@ -81,9 +82,6 @@ pub struct SharpPermutation {
     pub gloss: bool,
     /// Whether the share of its view that lamps take is kept of every vertex, for bounces.
     pub lamps: bool,
-    /// Whether every point leaves out the occluders of its lists that stand outside a light's cone. It saves a quarter
-    /// of the time or more in scenes of several sharp lights, and costs a fifth under one light.
-    pub cones: bool,
     /// Whether vertices that a shadow's edge comes near are marked, and their irradiance by each light is kept, for pixels
     /// that evaluate lights there.
     pub edges: bool,
@@ -130,7 +128,6 @@ impl SharpPermutation {
             .define("CUBOIDS", self.cuboids)
             .define("GLOBES", self.globes)
             .define("SELF", self.self_shadows)
-            .define("CONES", self.cones)
             .define("EDGES", self.edges)
             .define("SHOWN", self.gloss)
             .define("LAMPS", self.lamps)

@@ -2,8 +2,6 @@
 
 #![allow(dead_code)] // every test binary uses its own part
 
-use shadow_fields::asset::embedded;
-use shadow_fields::scene::Scene;
 use std::path::{Path, PathBuf};
 
 /// Its text for pictures of a size, with more keys of the lamp.
@@ -33,11 +31,6 @@ emission = [30, 24, 12]
 {of_the_lamp}
 "#
     )
-}
-
-/// The scene, with the lamp at rest.
-pub fn scene(size: [u32; 2]) -> Scene {
-    Scene::parse(&text(size, ""), Path::new("room.toml"), &embedded::read).unwrap()
 }
 
 /// Writes it as `scene.toml`, beside which a window saves what it is told to.

@@ -32,6 +32,11 @@ impl Stand {
 
     /// One whose setup is changed first.
     pub fn with(name: &str, change: impl FnOnce(&mut Setup)) -> Option<Self> {
+        Self::of(name, "", change)
+    }
+
+    /// With more keys of the lamp.
+    pub fn of(name: &str, of_the_lamp: &str, change: impl FnOnce(&mut Setup)) -> Option<Self> {
         let gpu = gpu()?;
         let cache = Path::new(env!("CARGO_TARGET_TMPDIR")).join(format!("view-{name}"));
         let _ = std::fs::remove_dir_all(&cache);
@@ -54,8 +59,8 @@ impl Stand {
         change(&mut setup);
         let options = setup.frame;
         // The state and pictures are saved beside the scene's file.
-        let path = room::write(&cache, SIZE, "");
-        let mut editor = Editor::new(room::scene(SIZE), &path);
+        let path = room::write(&cache, SIZE, of_the_lamp);
+        let mut editor = Editor::new(Scene::load(&path).unwrap(), &path);
         editor.apply(Command::ToggleOverlay);
         let viewer = Viewer::new(setup, editor, 1.0).unwrap();
         let [width, height] = SIZE;

@@ -72,6 +72,21 @@ fn vertices_follow_their_joints() {
 }
 
 #[test]
+fn a_posed_cloth_has_the_sides_that_are_seen() {
+    let (mut model, _) = arm();
+    let material = model.push("materials", json!({ "doubleSided": true }));
+    model.json["meshes"][0]["primitives"][0]["material"] = json!(material);
+    let camera = model.push("cameras", json!({ "type": "perspective", "perspective": { "yfov": 0.7, "znear": 0.1 } }));
+    // The cloth stands at z = 5 and faces +z.
+    model.node(json!({ "camera": camera, "translation": [1, 0, 9] }));
+    assert!(!posed(&model, 0.0).1.meshes[0].is_two_sided());
+    model.node(json!({ "camera": camera, "translation": [1, 0, 1] }));
+    let (points, import) = posed(&model, 0.0);
+    assert!(import.meshes[0].is_two_sided());
+    assert_near(&points[..3], &[[0., 0., 5.], [1., 0., 5.], [2., 0.1, 5.]]);
+}
+
+#[test]
 fn morph_targets_move_vertices_by_their_shares() {
     let mut model = Model::default();
     let positions = model.positions(&[0., 0., 0., 1., 0., 0., 0., 1., 0.]);

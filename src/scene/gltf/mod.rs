@@ -233,8 +233,9 @@ pub(super) struct Reader {
     stage: Option<Rc<Stage>>,
     textures: Textures,
     primitives: HashMap<PartKey, Option<Rc<Primitive>>>,
-    /// What sees the backs of surfaces; `None` within for a scene that is too large.
-    onlookers: Option<Option<Rc<Onlookers>>>,
+    /// What sees the backs of surfaces that have no pose, and of those with the pose of a time; `None` for a scene that
+    /// is too large.
+    onlookers: HashMap<Option<u64>, Option<Rc<Onlookers>>>,
     /// What they have seen of parts, solids and others.
     sides: HashMap<(PartKey, Option<u32>, bool), Sides>,
     triangle_count: usize,
@@ -249,7 +250,7 @@ impl Reader {
             document,
             stage: None,
             primitives: HashMap::new(),
-            onlookers: None,
+            onlookers: HashMap::new(),
             sides: HashMap::new(),
             triangle_count: 0,
             notes: Notes::default(),
@@ -337,22 +338,24 @@ impl Reader {
         }
     }
 
-    /// The sides of a part that are seen. A pose is not looked at.
+    /// The sides of a part that are seen.
     fn sides(&mut self, part: Part, is_solid: bool) -> Result<Sides> {
         let key = (part.key(), part.piece, is_solid);
         if let Some(known) = self.sides.get(&key) {
             return Ok(*known);
         }
-        let onlookers = self.onlookers()?.filter(|_| part.pose.is_none());
+        let onlookers = self.onlookers(part.pose.map(|pose| pose.time_s))?;
         let sides = onlookers.map_or(Sides::Front, |all| all.sides([part.mesh, part.at], part.piece, is_solid));
         self.sides.insert(key, sides);
         Ok(sides)
     }
 
-    /// What sees the backs of surfaces, found once; `None` for a scene that is too large.
-    fn onlookers(&mut self) -> Result<Option<Rc<Onlookers>>> {
-        if let Some(onlookers) = &self.onlookers {
-            return Ok(onlookers.clone());
+    /// What sees the backs of surfaces, among them the ones that have a pose at `time_s`; found once. `None` for a scene
+    /// that is too large.
+    fn onlookers(&mut self, time_s: Option<f64>) -> Result<Option<Rc<Onlookers>>> {
+        let key = time_s.map(f64::to_bits);
+        if let Some(known) = self.onlookers.get(&key) {
+            return Ok(known.clone());
         }
         let document = self.document.clone();
         let stage = self.stage()?;
@@ -360,33 +363,34 @@ impl Reader {
         for stand in &stage.stands {
             let node = &document.root.nodes[stand.node];
             let Some(mesh) = node.mesh.map(|mesh| mesh.value()) else { continue };
-            if pose::is_posed(&document, stand.node, stage.tracks[stand.node].as_ref()) {
+            let is_posed = pose::is_posed(&document, stand.node, stage.tracks[stand.node].as_ref());
+            let pose = time_s.filter(|_| is_posed).map(|time_s| PoseData { node: stand.node, time_s });
+            if is_posed && pose.is_none() {
                 continue;
             }
+            // A skin's vertices are in the world.
+            let place = if node.skin.is_some() { DAffine3::IDENTITY } else { stand.rest };
             for at in 0..document.root.meshes[mesh].primitives.len() {
                 // A primitive that cannot be read is refused where it is wanted.
-                let part = Part { mesh, at, pose: None, piece: None };
-                let Ok(Some(primitive)) = self.primitive(part) else { continue };
+                let Ok(Some(primitive)) = self.primitive(Part { mesh, at, pose, piece: None }) else { continue };
                 if primitive.surface.opacity < 1.0 || primitive.surface.has_alpha() {
                     continue;
                 }
                 if surfaces.len() + primitive.shape.triangle_count() > backs::TRIANGLES_LIMIT {
-                    return Ok(self.onlookers.insert(None).clone());
+                    return Ok(self.onlookers.entry(key).or_insert(None).clone());
                 }
-                let corners = primitive.shape.corners(stand.rest);
+                let corners = primitive.shape.corners(place);
                 let owners = primitive.pieces().iter().map(|piece| Owner { primitive: [mesh, at], piece: *piece });
                 // Others are refused as well.
                 let is_in_range = |corner: &Vec3| corner.abs().cmple(Vec3::splat(POSITION_LIMIT_M)).all();
                 surfaces.extend(owners.zip(corners).filter(|(_, corners)| corners.iter().all(is_in_range)));
             }
         }
-        if surfaces.is_empty() {
-            return Ok(self.onlookers.insert(None).clone());
-        }
         let is_camera = |stand: &&Stand| document.root.nodes[stand.node].camera.is_some();
         let cameras: Vec<Vec3> =
             stage.stands.iter().filter(is_camera).map(|stand| stand.rest.translation.as_vec3()).collect();
-        Ok(self.onlookers.insert(Some(Rc::new(Onlookers::new(&surfaces, &cameras)))).clone())
+        let onlookers = (!surfaces.is_empty()).then(|| Rc::new(Onlookers::new(&surfaces, &cameras)));
+        Ok(self.onlookers.entry(key).or_insert(onlookers).clone())
     }
 
     /// The primitive of a part, if it has triangles; each is read once.

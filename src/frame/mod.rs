@@ -162,11 +162,6 @@ impl Frame {
         let sharp = permutation::sharp(&options, &permutation, &methods, &scene, &buffers);
         if sharp.is_some() {
             radiosity.keep_soft()?;
-            // Pixels evaluate lights of several colours wherever they evaluate any.
-            let has_colors = |light: usize| scene.meshes[scene.entities[light].mesh].colors.is_some();
-            let is_kept =
-                |&light: &usize| scene.entities[light].emits && methods[light].is_sharp() && !has_colors(light);
-            radiosity.keep_irradiances((0..scene.entities.len()).filter(is_kept))?;
         }
         let threads = if device.info.is_software() { gpu::driver_threads() } else { 1 };
         let mut lists = ClusterLists::new(threads);
@@ -188,6 +183,9 @@ impl Frame {
         let soft = sharp.is_some();
         let sharp =
             sharp.map(|fitting| SharpPermutation { edges: pixels.is_some(), lamps: linked.is_some(), ..fitting });
+        if sharp.is_some_and(|permutation| permutation.edges) {
+            radiosity.keep_irradiances(&scene, &methods)?;
+        }
         let reflectors = reflections.is_some().then(|| mirror::reflectors(&scene)).unwrap_or_default();
         let lights = reflectors.lights(pixels, sharp);
         if lights.mirrors > 0 && !bounces {

@@ -166,6 +166,7 @@ impl Frame {
         let Some(sharp) = self.sharp.as_mut().filter(|sharp| sharp.permutation.edges != edges) else { return Ok(()) };
         *sharp = Sharp::new(&self.device, &self.library, SharpPermutation { edges, ..sharp.permutation })?;
         if edges {
+            self.radiosity.keep_irradiances(&self.scene, &self.methods)?;
             self.forget();
         }
         Ok(())

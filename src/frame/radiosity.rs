@@ -4,7 +4,7 @@ use super::viewport::RadiositySource;
 use crate::bounce::{BouncedLight, Bounces};
 use crate::error::Result;
 use crate::gpu::{Buffer, BufferKind, Device};
-use crate::scene::Scene;
+use crate::scene::{LightMethod, Scene};
 use crate::scene_buffers::SceneBuffers;
 use std::sync::Arc;
 
@@ -18,7 +18,7 @@ pub(super) struct RadiosityBuffers {
     direct: Option<Direct>,
     /// Zeros, where mirrors show nothing but lamps.
     dark: Option<Buffer>,
-    /// Irradiance of every vertex by sharp lights, where pixels evaluate these.
+    /// Irradiance of every vertex by sharp lights, once pixels evaluate these.
     irradiances: Option<Irradiances>,
     /// The first byte of each entity.
     pub offsets: Vec<u64>,
@@ -71,13 +71,20 @@ impl RadiosityBuffers {
         Ok(())
     }
 
-    /// Keeps the irradiances by these sharp lights from now on, or by as many of them as the device can bind at once.
-    pub fn keep_irradiances(&mut self, lights: impl Iterator<Item = usize>) -> Result<()> {
+    /// Keeps the irradiances by the first sharp lights from now on, at most as many as the device can bind at once.
+    pub fn keep_irradiances(&mut self, scene: &Scene, methods: &[LightMethod]) -> Result<()> {
+        if self.irradiances.is_some() {
+            return Ok(());
+        }
+        // Pixels evaluate lights of several colours wherever they evaluate any.
+        let has_colors = |light: usize| scene.meshes[scene.entities[light].mesh].colors.is_some();
+        let is_kept = |&light: &usize| scene.entities[light].emits && methods[light].is_sharp() && !has_colors(light);
         let device = self.merged.device();
         let limits = &device.limits;
         let bound = limits.max_texel_buffer_elements.min(limits.max_storage_buffer_range / 4);
         let vertices = self.merged.size_bytes / 16;
         let most = (u64::from(bound) / vertices) as usize;
+        let lights = (0..scene.entities.len()).filter(is_kept);
         let lights: Vec<usize> = lights.take(most.min(MOST_KEPT_LIGHTS)).collect();
         let size_bytes = (lights.len() as u64 * 4 * vertices).max(4);
         let buffer = Buffer::zeros(device, "irradiances", size_bytes)?;

@@ -33,7 +33,7 @@ pub type StructLayout = Vec<(String, u32)>;
 
 #[derive(Clone, Debug, Default)]
 pub struct Reflection {
-    /// Bindings that the optimised code still uses, by index.
+    /// Bindings that the module declares, by index.
     pub bindings: Vec<Binding>,
     /// Size of the push-constant block in bytes; 0 without one.
     pub push_bytes: u32,

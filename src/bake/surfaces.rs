@@ -28,7 +28,7 @@ use std::sync::{Arc, OnceLock};
 use std::time::Instant;
 
 /// Counts in every name of the cache: another number where a bake of surfaces computes something else.
-const VERSION: u32 = 30;
+const VERSION: u32 = 31;
 /// How far towards the middle of its triangles a vertex is seen from, as a share of the way: the light of a crease is
 /// that just inside each face. Where meshes are left as they are, so are the places from which they are seen.
 const NUDGE: f32 = 0.02;
@@ -54,6 +54,8 @@ pub(super) const BURIED_BACKS: f64 = 0.5;
 pub(super) const BURIED_BLOCKED: f64 = 0.35;
 /// Places on the way from a buried vertex to the middle of a triangle where one that is not may be.
 const WAYS_OUT: [f32; 5] = [0.06, 0.15, 0.3, 0.5, 0.8];
+/// The same on the way to the vertices beside it, where the middles of all its triangles are buried too.
+const WAYS_ALONG: [f32; 2] = [0.5, 0.95];
 
 #[derive(Clone)]
 pub struct Member {
@@ -629,9 +631,24 @@ impl GroupSpace<'_> {
                     };
                     let middles =
                         || around.get_or_init(|| triangles_around(&mesh))[v].iter().map(|&triangle| middle(triangle));
-                    let mut ways = WAYS_OUT.iter().flat_map(|way| middles().map(|m| position.lerp(m, *way)));
+                    let after = |triangle: u32| {
+                        let corners = mesh.triangles[triangle as usize];
+                        let at = corners.iter().position(|&corner| corner as usize == v).unwrap_or(0);
+                        mesh.positions[corners[(at + 1) % 3] as usize]
+                    };
+                    let neighbours =
+                        || around.get_or_init(|| triangles_around(&mesh))[v].iter().map(|&triangle| after(triangle));
                     let free = |place: &Vec3| !self.see(*place, normal, nudge, Rays::Few).buried;
-                    ways.find(free).map_or(here, see)
+                    let mut inwards = WAYS_OUT.iter().flat_map(|way| middles().map(|m| position.lerp(m, *way)));
+                    let along = || {
+                        let ways = WAYS_ALONG.iter().flat_map(|way| neighbours().map(|n| position.lerp(n, *way)));
+                        let places: Vec<Vec3> = ways.filter(free).collect();
+                        let first = *places.first()?;
+                        // On both sides of a wall there is no light that suits both.
+                        let is_beside = |place: &Vec3| !self.is_between(first + nudge, *place + nudge);
+                        places.iter().all(is_beside).then_some(first)
+                    };
+                    inwards.find(free).or_else(along).map_or(here, see)
                 };
                 let linked = |v: &u32| {
                     let mut seen = vertex(v);

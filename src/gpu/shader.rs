@@ -112,11 +112,7 @@ fn key(source: &ShaderSource<'_>, includes: &BTreeMap<String, String>) -> String
         hasher.update(&(text.len() as u64).to_le_bytes());
         hasher.update(text.as_bytes());
     };
-    part(&format!(
-        "{:?} {:?} vulkan1.3 spirv1.5",
-        COMPILER.get_or_init(shaderc::get_spirv_version),
-        source.stage
-    ));
+    part(&format!("{:?} {:?} vulkan1.3 spirv1.5", COMPILER.get_or_init(shaderc::get_spirv_version), source.stage));
     part(env!("CARGO_PKG_VERSION"));
     part(&source.text);
     for (name, value) in source.defines {

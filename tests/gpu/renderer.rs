@@ -160,21 +160,3 @@ fn a_renderer_lights_its_scene_at_once_and_refuses_what_is_no_placement() {
         assert!(matches!(Renderer::new(&door, &scene, &options), Err(Error::Input(_))));
     }
 }
-
-/// A graphics card's memory cannot be mapped as a whole: what lies there is copied, and light and picture are the same.
-#[test]
-fn what_cannot_be_mapped_is_copied() {
-    let Some(gpu) = gpu() else { return };
-    let scene = room().build().unwrap();
-    let render = || {
-        let options = frame::Options { bake: Quality::Draft.options(), size: [96, 64], ..Default::default() };
-        let mut frame = gpu.frame(&scene, options);
-        frame.render(&scene.at(0.0), Some(1.0)).unwrap();
-        (frame.picture(), frame.radiosity(0).unwrap())
-    };
-    let mapped = render();
-    gpu.device.map_no_device_memory(true);
-    let copied = render();
-    gpu.device.map_no_device_memory(false);
-    assert!(mapped == copied);
-}

@@ -266,15 +266,6 @@ fn obj_dialects() {
 }
 
 #[test]
-fn content_hash_tells_meshes_apart() {
-    let hashes: Vec<_> = library().iter().map(Mesh::content_hash).collect();
-    for (i, a) in hashes.iter().enumerate() {
-        assert!(hashes[i + 1..].iter().all(|b| a != b));
-    }
-    assert_ne!(torus(0.5, 0.15, 48, 20).content_hash(), torus_two_colour(0.5, 0.15, 48, 20).content_hash());
-}
-
-#[test]
 fn generators_refuse_bad_numbers() {
     let bad = [
         Generator::Plane { size_m: 0.0, cells: 4 },

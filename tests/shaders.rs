@@ -69,53 +69,39 @@ fn bouncing() -> Vec<ShaderPermutation> {
     [false, true].into_iter().flat_map(rows).chain(movers).collect()
 }
 
-/// Every way of the pass of sharp lights.
+/// A way of the pass of sharp lights: each of six bits switches several of its parts.
+fn sharp_way(bits: u32) -> SharpPermutation {
+    let on = |bit: u32| bits >> bit & 1 == 1;
+    SharpPermutation {
+        reads: [Reads::Storage, Reads::StorageUniform, Reads::Texels][bits as usize % 3],
+        entity_limit: 48,
+        silhouette: SilhouetteOptions::default(),
+        outlines: on(2),
+        panels: on(3),
+        halves: on(2) != on(3),
+        boxes: on(2) != on(4),
+        colors: on(1) != on(3),
+        sheets: on(1),
+        cuboids: on(1) != on(2),
+        globes: on(3),
+        gloss: on(0),
+        lamps: on(0),
+        self_shadows: on(4),
+        edges: on(0) == on(2),
+        rolled: on(5),
+    }
+}
+
 fn sharp() -> Vec<ShaderPermutation> {
-    let way = |bits: u32| {
-        let on = |bit: u32| bits >> bit & 1 == 1;
-        let silhouette = SilhouetteOptions::default();
-        SharpPermutation {
-            reads: [Reads::Storage, Reads::StorageUniform, Reads::Texels][bits as usize % 3],
-            entity_limit: 48,
-            silhouette,
-            outlines: on(2),
-            panels: on(3),
-            halves: on(2) != on(3),
-            boxes: on(2) != on(4),
-            colors: on(1) != on(3),
-            sheets: on(1),
-            cuboids: on(1) != on(2),
-            globes: on(3),
-            gloss: on(0),
-            lamps: on(0),
-            self_shadows: on(4),
-            edges: on(0) == on(2),
-            rolled: on(5),
-        }
-        .row()
-    };
-    (0..64).map(way).collect()
+    (0..64).map(|bits| sharp_way(bits).row()).collect()
 }
 
 fn drawing() -> Vec<ShaderPermutation> {
-    let silhouette = SilhouetteOptions::default();
-    let sharp = [false, true].map(|outlines| SharpPermutation {
-        reads: Reads::Texels,
-        entity_limit: 48,
-        silhouette,
-        outlines,
-        panels: outlines,
-        halves: outlines,
-        boxes: outlines,
-        colors: outlines,
-        sheets: outlines,
-        cuboids: outlines,
-        globes: outlines,
-        gloss: outlines,
-        lamps: false,
-        self_shadows: true,
-        edges: true,
-        rolled: outlines,
+    // Without lights of any form but balls, and with all of them.
+    let sharp = [0, 0b10_0110].map(|bits| {
+        let all = bits > 0;
+        let way = SharpPermutation { reads: Reads::Texels, panels: all, cuboids: all, globes: all, ..sharp_way(bits) };
+        SharpPermutation { gloss: all, lamps: false, self_shadows: true, edges: true, ..way }
     });
     let ways = [None, Some(&sharp[0]), Some(&sharp[1])];
     let grids = [false, true].map(DrawGrid::rows).concat();

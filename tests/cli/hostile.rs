@@ -2,7 +2,7 @@
 //! and ends with the exit code that the reason has.
 #![cfg(unix)]
 
-use crate::cli::{COARSE, Folder, TRIANGLE, finish, limited, without_drivers};
+use crate::cli::{COARSE, Folder, TRIANGLE, finish, has_device, limited, without_drivers};
 use crate::common;
 use shadow_fields::error::is_deceptive;
 use std::ffi::OsStr;
@@ -16,10 +16,6 @@ fn folder() -> Folder {
     Folder::of(&[("m.obj", TRIANGLE)])
 }
 
-fn with_device() -> Option<Folder> {
-    crate::cli::has_device().then(folder)
-}
-
 /// No control or bidirectional character but the ends of lines.
 fn assert_clean(text: &str) {
     assert!(text.chars().all(|c| c == '\n' || !is_deceptive(c)), "{text:?}");
@@ -27,7 +23,7 @@ fn assert_clean(text: &str) {
 
 #[test]
 fn paths_are_bytes() {
-    let Some(folder) = with_device() else { return };
+    let Some(folder) = has_device().then(folder) else { return };
     let name = |text: &'static [u8]| OsStr::from_bytes(text);
     let ends = |command: &mut Command, code: i32, made: &[&'static [u8]]| {
         let ran = finish(command);
@@ -91,7 +87,7 @@ fn control_characters_do_not_reach_the_terminal() {
 #[test]
 #[cfg(target_os = "linux")]
 fn full_devices_are_told_alike() {
-    let Some(folder) = with_device() else { return };
+    let Some(folder) = has_device().then(folder) else { return };
     for command in [BAKE, RENDER] {
         let ran = folder.run(&format!("{command} -o /dev/full"));
         assert!(ran.code == 1 && ran.stderr.contains("/dev/full: cannot be written: No space left"), "{}", ran.stderr);

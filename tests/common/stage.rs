@@ -4,9 +4,11 @@
 
 use super::common::{parse, relative_rms};
 use glam::{EulerRot, Quat, Vec3};
+use shadow_fields::asset::texture::{Texels, Texture, Wrap};
 use shadow_fields::frame;
-use shadow_fields::scene::{Placement, Scene};
+use shadow_fields::scene::{EntityData, Placement, Scene};
 use shadow_fields::truth::{Estimate, Vertex};
+use std::sync::Arc;
 
 /// Few samples of few texels in f32: quick, and all that a comparison with a twin needs. The variant is pinned.
 pub fn small() -> frame::Options {
@@ -21,6 +23,22 @@ pub fn scene(text: &str) -> Scene {
 /// An object upright at a place in its own size.
 pub fn at(x: f32, y: f32, z: f32) -> Placement {
     Placement { position: Vec3::new(x, y, z), rotation: Quat::IDENTITY, scale: 1.0 }
+}
+
+/// A thing that stands somewhere.
+pub fn stands(mesh: &str, position: [f32; 3]) -> EntityData {
+    EntityData { position: position.into(), ..EntityData::of_mesh(mesh) }
+}
+
+/// A lamp of that radiance.
+pub fn shines(mesh: &str, position: [f32; 3], radiance: f32) -> EntityData {
+    EntityData { emission: Vec3::splat(radiance), ..stands(mesh, position) }
+}
+
+/// A square texture of that many texels along a side, with holes where their alpha is below a half.
+pub fn holed(side: usize, rgba: Vec<[u8; 4]>) -> Texture {
+    let texels = Some(Arc::new(Texels { width: side, height: side, rgba }));
+    Texture { texels, wrap: [Wrap::Clamp; 2], factor: Vec3::ONE, alpha_cutoff: Some(0.5), alpha_blend: false }
 }
 
 /// The same a little further on, by at most `reach_m` level and a fifth of that upwards, and turned.

@@ -61,7 +61,6 @@ fn kills_lose_at_most_the_slice() {
     let Some(farm) = Farm::planned() else { return };
     let kills: usize = std::env::var("SHADOW_FIELDS_FARM_KILLS").map_or(4, |text| text.parse().unwrap());
     let mut random = fastrand::Rng::with_seed(7);
-    let mut done = 0;
     let mut killed = 0;
     for kill in 0..kills {
         if kill % 4 == 0 {
@@ -100,11 +99,10 @@ fn kills_lose_at_most_the_slice() {
         let said: Value = serde_json::from_str(&found.stdout).unwrap();
         assert_eq!(said["damaged"], serde_json::json!([]), "nothing is wrong: {}", found.stderr);
         assert_eq!(said["missing"].as_array().unwrap().len(), MESHES - after.len());
-        done += usize::from(found.code == 0);
     }
     farm.good("farm submit p.json --engine local");
     let _ = std::fs::remove_dir_all(farm.at("cache"));
     assert!(farm.collected() == whole().files);
     // What killed slices left is swept by the next that writes to the same folder, and is no result in any case.
-    common::report(&format!("{kills} moments, {killed} processes killed, {done} plans whole then"));
+    common::report(&format!("{kills} moments, {killed} processes killed"));
 }

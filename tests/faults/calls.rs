@@ -114,8 +114,6 @@ layer! {
         vkBeginCommandBuffer: PFN_vkBeginCommandBuffer(
             buffer: vk::CommandBuffer, info: *const vk::CommandBufferBeginInfo<'_>) [MEMORY];
         vkEndCommandBuffer: PFN_vkEndCommandBuffer(buffer: vk::CommandBuffer) [MEMORY];
-        vkQueueSubmit: PFN_vkQueueSubmit(
-            queue: vk::Queue, count: u32, infos: *const vk::SubmitInfo<'_>, fence: vk::Fence) [LOST];
         vkQueueSubmit2: PFN_vkQueueSubmit2(
             queue: vk::Queue, count: u32, infos: *const vk::SubmitInfo2<'_>, fence: vk::Fence) [LOST];
         vkWaitForFences: PFN_vkWaitForFences(

@@ -4,7 +4,7 @@
 use super::claimed::Claims;
 use super::layer::watch;
 use super::sweep::assert_clean;
-use super::{Place, run};
+use super::{Place, SMALL, run};
 use shadow_fields::error::one_line;
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -23,73 +23,72 @@ enum Outcome {
 use Outcome::{Other, Refused, Same};
 
 /// A device that has less, what is asked of it, and what follows.
-type Row<T> = (&'static str, &'static [&'static str], T, Outcome);
+type Row<T> = (&'static str, &'static str, T, Outcome);
 
 const ALL: Claims = Claims::NONE;
 
 /// Less than the program needs, or nothing that it needs.
 #[rustfmt::skip]
 const OTHERS: &[Row<Claims>] = &[
-    ("Vulkan 1.2", &[], Claims { api_version: ash::vk::API_VERSION_1_2, ..ALL },
+    ("Vulkan 1.2", "", Claims { api_version: ash::vk::API_VERSION_1_2, ..ALL },
         Refused(3, "supports Vulkan 1.2.0, but 1.3 is needed")),
-    ("no dynamic rendering", &[], Claims { features: |f| f.dynamic_rendering = 0, ..ALL },
+    ("no dynamic rendering", "", Claims { features: |f| f.dynamic_rendering = 0, ..ALL },
         Refused(3, "lacks the feature dynamicRendering")),
-    ("no synchronization2", &[], Claims { features: |f| f.synchronization2 = 0, ..ALL },
+    ("no synchronization2", "", Claims { features: |f| f.synchronization2 = 0, ..ALL },
         Refused(3, "lacks the feature synchronization2")),
-    ("no maintenance4", &[], Claims { features: |f| f.maintenance4 = 0, ..ALL }, Same),
-    ("no timestamps", &[], Claims { family: |f| f.timestamp_valid_bits = 0, ..ALL },
+    ("no maintenance4", "", Claims { features: |f| f.maintenance4 = 0, ..ALL }, Same),
+    ("no timestamps", "", Claims { family: |f| f.timestamp_valid_bits = 0, ..ALL },
         Refused(3, "has no queue with graphics, compute and timestamps")),
-    ("timestamps of 36 bits", &[], Claims { family: |f| f.timestamp_valid_bits = 36, ..ALL }, Same),
-    ("no names for debuggers", &[], Claims { extension: |name| name != ash::ext::debug_utils::NAME, ..ALL }, Same),
-    ("memory that the host cannot see", &[], Claims { splits_memory: true, ..ALL }, Same),
-    ("20 MB of memory", &["--size", "2048x2048"], Claims { heap_bytes: Some(20_000_000), ..ALL },
+    ("timestamps of 36 bits", "", Claims { family: |f| f.timestamp_valid_bits = 36, ..ALL }, Same),
+    ("no names for debuggers", "", Claims { extension: |name| name != ash::ext::debug_utils::NAME, ..ALL }, Same),
+    ("memory that the host cannot see", "", Claims { splits_memory: true, ..ALL }, Same),
+    ("20 MB of memory", "--size 2048x2048", Claims { heap_bytes: Some(20_000_000), ..ALL },
         Refused(4, "but the device has 0.02 GB")),
 ];
 
 /// The least that Vulkan 1.3 allows, and less than the program needs.
 #[rustfmt::skip]
 const LIMITS: &[Row<fn(&mut ash::vk::PhysicalDeviceLimits)>] = &[
-    ("128 bytes of push constants", &[], |l| l.max_push_constants_size = 128, Same),
-    ("16 bytes of push constants", &[], |l| l.max_push_constants_size = 16,
+    ("128 bytes of push constants", "", |l| l.max_push_constants_size = 128, Same),
+    ("16 bytes of push constants", "", |l| l.max_push_constants_size = 16,
         Refused(3, "bytes of push constants, the device takes 16")),
-    ("128 invocations a workgroup", &[], |l| l.max_compute_work_group_invocations = 128, Same),
-    ("16 invocations a workgroup", &[], |l| l.max_compute_work_group_invocations = 16,
+    ("128 invocations a workgroup", "", |l| l.max_compute_work_group_invocations = 128, Same),
+    ("16 invocations a workgroup", "", |l| l.max_compute_work_group_invocations = 16,
         Refused(3, "invocations a workgroup, the device takes 16")),
-    ("128 invocations along x", &[], |l| l.max_compute_work_group_size = [128, 128, 64], Same),
-    ("8 invocations along x", &[], |l| l.max_compute_work_group_size = [8, 128, 64],
+    ("128 invocations along x", "", |l| l.max_compute_work_group_size = [128, 128, 64], Same),
+    ("8 invocations along x", "", |l| l.max_compute_work_group_size = [8, 128, 64],
         Refused(3, "invocations a workgroup along x, the device takes 8")),
-    ("16 KiB of shared memory", &[], |l| l.max_compute_shared_memory_size = 16384, Same),
-    ("64 bytes of shared memory", &[], |l| l.max_compute_shared_memory_size = 64,
+    ("16 KiB of shared memory", "", |l| l.max_compute_shared_memory_size = 16384, Same),
+    ("64 bytes of shared memory", "", |l| l.max_compute_shared_memory_size = 64,
         Refused(3, "bytes of memory shared by a workgroup, the device takes 64")),
-    ("4 storage buffers a stage", &[], |l| l.max_per_stage_descriptor_storage_buffers = 4,
+    ("4 storage buffers a stage", "", |l| l.max_per_stage_descriptor_storage_buffers = 4,
         Refused(3, "storage buffers a stage, the device takes 4")),
-    ("12 uniform buffers a stage", &[], |l| l.max_per_stage_descriptor_uniform_buffers = 12, Same),
-    ("16 sampled images a stage", &[], |l| l.max_per_stage_descriptor_sampled_images = 16, Same),
-    ("no sampled images", &["--variant", "texel-packed"], |l| l.max_per_stage_descriptor_sampled_images = 0,
+    ("12 uniform buffers a stage", "", |l| l.max_per_stage_descriptor_uniform_buffers = 12, Same),
+    ("16 sampled images a stage", "", |l| l.max_per_stage_descriptor_sampled_images = 16, Same),
+    ("no sampled images", "--variant texel-packed", |l| l.max_per_stage_descriptor_sampled_images = 0,
         Refused(3, "sampled images a stage, the device takes 0")),
-    ("storage buffers of 128 MiB", &[], |l| l.max_storage_buffer_range = 1 << 27, Same),
-    ("storage buffers of 512 bytes", &[], |l| l.max_storage_buffer_range = 512,
+    ("storage buffers of 128 MiB", "", |l| l.max_storage_buffer_range = 1 << 27, Same),
+    ("storage buffers of 512 bytes", "", |l| l.max_storage_buffer_range = 512,
         Refused(4, "bytes, the device takes 512")),
-    ("uniform buffers of 16 KiB", &["--variant", "storage-uniform"], |l| l.max_uniform_buffer_range = 1 << 14, Same),
-    ("texel buffers of 65536 texels", &["--variant", "texel-packed"], |l| l.max_texel_buffer_elements = 1 << 16, Same),
-    ("texel buffers of 4 texels", &["--variant", "texel-packed"], |l| l.max_texel_buffer_elements = 4, Refused(4, "(4)")),
-    ("images of 4096 pixels", &[], |l| l.max_image_dimension2_d = 4096, Same),
-    ("images of 8 pixels", &[], |l| l.max_image_dimension2_d = 8, Refused(4, "at most 8 px")),
-    ("framebuffers 32 pixels high", &["--size", "40x40", "--lights", "sh"], |l| l.max_framebuffer_height = 32,
+    ("uniform buffers of 16 KiB", "--variant storage-uniform", |l| l.max_uniform_buffer_range = 1 << 14, Same),
+    ("texel buffers of 65536 texels", "--variant texel-packed", |l| l.max_texel_buffer_elements = 1 << 16, Same),
+    ("texel buffers of 4 texels", "--variant texel-packed", |l| l.max_texel_buffer_elements = 4, Refused(4, "(4)")),
+    ("images of 4096 pixels", "", |l| l.max_image_dimension2_d = 4096, Same),
+    ("images of 8 pixels", "", |l| l.max_image_dimension2_d = 8, Refused(4, "at most 8 px")),
+    ("framebuffers 32 pixels high", "--size 40x40 --lights sh", |l| l.max_framebuffer_height = 32,
         Refused(4, "40x40 is outside the device's 1..=32")),
-    ("one workgroup", &[], |l| l.max_compute_work_group_count = [1; 3],
+    ("one workgroup", "", |l| l.max_compute_work_group_count = [1; 3],
         Refused(4, "the device takes [1, 1, 1]")),
-    ("buffers at 256 bytes", &[],
+    ("buffers at 256 bytes", "",
         |l| (l.min_storage_buffer_offset_alignment, l.min_uniform_buffer_offset_alignment) = (256, 256), Same),
-    ("one sample a pixel", &["--antialias", "samples", "--lights", "sh"],
+    ("one sample a pixel", "--antialias samples --lights sh",
         |l| l.framebuffer_color_sample_counts = ash::vk::SampleCountFlags::TYPE_1, Other),
 ];
 
-fn picture(folder: &Path, more: &[&str]) -> shadow_fields::Result<()> {
-    let variant = if more.contains(&"--variant") { &[][..] } else { &["--variant", "storage"] };
-    let small = ["--lattice", "cube:2x3", "--face-px", "4", "--quality", "draft"];
-    let antialias = if more.contains(&"--antialias") { &[][..] } else { &["--antialias", "none"] };
-    run(folder, &[&["render", "@scene.toml", "-o", "@p.png"], variant, antialias, &small, more].concat())
+fn picture(folder: &Path, more: &str) -> shadow_fields::Result<()> {
+    let variant = if more.contains("--variant") { "" } else { "--variant storage" };
+    let antialias = if more.contains("--antialias") { "" } else { "--antialias none" };
+    run(folder, &format!("render @scene.toml -o @p.png {variant} {antialias} {SMALL} {more}"))
 }
 
 #[test]

@@ -45,36 +45,33 @@ const MESH: &str = "v 0 0 0 1 0 0\nv 1 0 0 0 1 0\nv 0 1 0 0 0 1\nv 0.2 0.2 1 1 1
     f 1 2 4\nf 2 3 4\nf 3 1 4\nf 2 1 5\nf 3 2 5\nf 1 3 5\n";
 
 /// Few samples of few texels.
-const SMALL: [&str; 6] = ["--lattice", "cube:2x3", "--face-px", "4", "--quality", "draft"];
+const SMALL: &str = "--lattice cube:2x3 --face-px 4 --quality draft";
 
-/// Runs the program in the folder, as from the command line.
-fn run(folder: &Path, arguments: &[&str]) -> Result<()> {
-    let place = |name: &str| folder.join(name).to_str().unwrap().to_owned();
-    let arguments = arguments.iter().map(|word| word.strip_prefix('@').map_or((*word).to_owned(), place));
-    let always = ["--quiet", "--cache-dir", "@cache"].map(|word| word.strip_prefix('@').map_or(word.to_owned(), place));
-    layer::without_stdout(|| app::run_on(["shadow-fields".to_owned()].into_iter().chain(arguments).chain(always)))
+/// Runs the program in the folder, as from the command line; names of files there begin with @.
+fn run(folder: &Path, line: &str) -> Result<()> {
+    let word = |word: &str| word.strip_prefix('@').map_or(word.into(), |name| folder.join(name).into_os_string());
+    let words = format!("shadow-fields {line} --quiet --cache-dir @cache");
+    layer::without_stdout(|| app::run_on(words.split_whitespace().map(word)))
 }
 
 /// A picture of a scene whose fields are baked for it, with all that can be written beside it.
 fn picture(folder: &Path) -> Result<()> {
-    let outputs = ["-o", "@p.png", "--exr", "@p.exr", "--vertices", "@v.csv", "--antialias", "outlines"];
-    let how = ["render", "@scene.toml", "--variant", "storage", "--shading", "vertex"];
-    run(folder, &[&how, &outputs[..], &SMALL].concat())
+    let outputs = "-o @p.png --exr @p.exr --vertices @v.csv --antialias outlines";
+    run(folder, &format!("render @scene.toml --variant storage --shading vertex {outputs} {SMALL}"))
 }
 
 /// The same by pixels, whose pipelines take the driver more than half of a run.
 fn pixels(folder: &Path) -> Result<()> {
-    run(folder, &[&["render", "@scene.toml", "--variant", "storage", "-o", "@x.png"], &SMALL[..]].concat())
+    run(folder, &format!("render @scene.toml --variant storage -o @x.png {SMALL}"))
 }
 
 /// An animation of two light forms, its fields out of the cache.
 fn animation(folder: &Path) -> Result<()> {
-    let outputs = ["-o", "@a.png", "--frames", "3", "--lights", "sh"];
-    run(folder, &[&["render", "@scene.toml", "--variant", "texel-packed"], &outputs[..], &SMALL].concat())
+    run(folder, &format!("render @scene.toml --variant texel-packed -o @a.png --frames 3 --lights sh {SMALL}"))
 }
 
 fn bake(folder: &Path) -> Result<()> {
-    run(folder, &[&["bake", "@mesh.obj", "-o", "@f.sf", "--radiance", "2,1,1"], &SMALL[..]].concat())
+    run(folder, &format!("bake @mesh.obj -o @f.sf --radiance 2,1,1 {SMALL}"))
 }
 
 /// Where only some calls fail, the others do in a job before.
@@ -104,7 +101,7 @@ impl Place {
         let folder = tempfile::tempdir().unwrap();
         std::fs::write(folder.path().join("scene.toml"), SCENE).unwrap();
         std::fs::write(folder.path().join("mesh.obj"), MESH).unwrap();
-        match run(folder.path(), &["devices"]) {
+        match run(folder.path(), "devices") {
             Ok(()) => Some(Place { folder, _turn: turn }),
             Err(Error::Unsupported(error)) => {
                 common::skip(&error);

@@ -79,13 +79,11 @@ impl Job {
         let plans = |at: usize| (0..calls[at].errors.len()).map(move |error| Plan { at, error });
         let wanted = (0..calls.len()).filter(|at| is_wanted(&calls[*at])).flat_map(plans);
         let is_name = |plan: &Plan| calls[plan.at].name == "vkSetDebugUtilsObjectNameEXT";
-        let (mut names, mut others): (Vec<Plan>, Vec<Plan>) = wanted.partition(is_name);
-        let mut random = fastrand::Rng::with_seed(1);
-        random.shuffle(&mut others);
-        random.shuffle(&mut names);
-        others.truncate(others.len().div_ceil(share));
-        names.truncate(names.len().div_ceil(if share == 1 { 1 } else { 10 * share }));
-        [others, names].concat()
+        let mut faults: Vec<Plan> =
+            wanted.filter(|plan| share == 1 || !is_name(plan) || plan.at.is_multiple_of(10)).collect();
+        fastrand::Rng::with_seed(1).shuffle(&mut faults);
+        faults.truncate(faults.len().div_ceil(share));
+        faults
     }
 
     /// Lets calls fail, each in a run of its own, and returns how many did. Runs follow each other in one process, and

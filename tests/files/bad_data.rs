@@ -2,29 +2,13 @@
 
 use glam::Vec3;
 use shadow_fields::Error;
-use shadow_fields::asset::disc::Sun;
-use shadow_fields::asset::environment::{EnvironmentData, EnvironmentImage, Gradient, KeyLight};
-use shadow_fields::asset::sky::Sky;
-use shadow_fields::asset::{Generator, Mesh, picture};
-use shadow_fields::scene::motion::{Keyframe, RotationData};
-use shadow_fields::scene::{Camera, EntityData, Motion, Output, Scene};
+use shadow_fields::asset::{Mesh, picture};
+use shadow_fields::scene::Scene;
+use std::path::Path;
 
 /// Numbers at and beyond every edge.
-const ODD: [f32; 14] = [
-    f32::NAN,
-    f32::INFINITY,
-    f32::NEG_INFINITY,
-    f32::MAX,
-    f32::MIN,
-    f32::MIN_POSITIVE,
-    1e-45,
-    0.0,
-    -0.0,
-    -1.0,
-    1e-7,
-    1e7,
-    1e15,
-    2.0,
+const ODD: [&str; 15] = [
+    "nan", "inf", "-inf", "3.4e38", "-3.4e38", "1.2e-38", "1e-45", "0", "-0.0", "-1", "1e-7", "1e7", "1e15", "2", "2.5",
 ];
 
 /// One line, where something is refused.
@@ -32,91 +16,38 @@ fn one_line<T>(outcome: Result<T, Error>) -> Option<T> {
     outcome.map_err(|error| assert!(!error.to_string().contains('\n'), "{error}")).ok()
 }
 
-/// A scene of one entity, and all that is asked of it without a device.
-fn try_scene(entity: EntityData, environment: EnvironmentData, camera: Camera, output: Output) -> bool {
-    let ball = Generator::Sphere { radius_m: 1.0, subdivisions: 1 };
-    let builder = Scene::builder().mesh("m", ball).environment(environment.clone()).camera(camera).output(output);
-    let Some(mut scene) = one_line(builder.entity(entity.clone()).build()) else { return false };
-    for time_s in [0.0, -1e9, 1e9, f64::NAN, f64::INFINITY, f64::MAX] {
-        assert_eq!(scene.at(time_s).len(), scene.entities.len());
-    }
-    assert!(scene.at(0.0).iter().all(|placement| placement.position.is_finite()));
-    scene.environment.coefficients(4);
-    scene.data.camera.up();
-    one_line(scene.to_toml());
-    one_line(scene.set_entity(0, entity));
-    one_line(scene.set_environment(&environment));
-    true
-}
-
+/// Every number of a scene that has all keys becomes each of these, and all is asked of what is read that needs no
+/// device. Scenes made in code go by the same rules: `tests/gpu/renderer.rs`.
 #[test]
-fn a_builder_refuses_numbers_in_one_line() {
-    let entity = || EntityData::of_mesh("m");
-    let key = |time_s| Keyframe { time_s, position: None, rotation: None, scale: None };
-    let moved = |motion| EntityData { motion: vec![motion], ..entity() };
-    let keys = |key| moved(Motion::Keyframes { keys: vec![key], repeat: true, interpolation: Default::default() });
-    let light = EnvironmentData::default;
-    let camera = || Camera::new(Vec3::Z, Vec3::ZERO);
-    let mut built = [0; 2];
-    for x in ODD {
-        let vector = Vec3::new(0.5, x, 0.5);
-        let entities = [
-            EntityData { position: vector, ..entity() },
-            EntityData { rotation: RotationData::AxisAngle { axis: vector, angle_deg: 10.0 }, ..entity() },
-            EntityData { rotation: RotationData::AxisAngle { axis: Vec3::Y, angle_deg: x.into() }, ..entity() },
-            EntityData { rotation: RotationData::Quaternion([x; 4]), ..entity() },
-            EntityData { scale: x, ..entity() },
-            EntityData { albedo: vector.into(), ..entity() },
-            EntityData { opacity: x, ..entity() },
-            EntityData { emission: vector, ..entity() },
-            moved(Motion::Orbit { centre: vector, axis: Vec3::Y, period_s: 1.0 }),
-            moved(Motion::Orbit { centre: Vec3::X, axis: vector, period_s: x.into() }),
-            moved(Motion::Spin { axis: Vec3::Y, period_s: x.into() }),
-            moved(Motion::Bob { axis: vector, amplitude_m: 1.0, period_s: 1.0, phase_deg: 0.0 }),
-            moved(Motion::Bob { axis: Vec3::Y, amplitude_m: x.into(), period_s: 1.0, phase_deg: 0.0 }),
-            moved(Motion::Bob { axis: Vec3::Y, amplitude_m: 1.0, period_s: 1.0, phase_deg: x.into() }),
-            keys(key(x.into())),
-            keys(Keyframe { position: Some(vector), ..key(0.0) }),
-            keys(Keyframe { scale: Some(x), ..key(0.0) }),
-        ];
-        let key_light = |radiance, toward, sharpness| Some(KeyLight { radiance, toward, sharpness });
-        let sun = |toward, angle_deg, radiance| Some(Sun { toward, angle_deg, radiance });
-        let lights = [
-            EnvironmentData { uniform: Some(Vec3::ONE), strength: x, ..light() },
-            EnvironmentData { turn_deg: x, ..light() },
-            EnvironmentData { uniform: Some(vector), ..light() },
-            EnvironmentData { gradient: Some(Gradient { radiance: vector, base: 0.5, rise: 0.5 }), ..light() },
-            EnvironmentData { gradient: Some(Gradient { radiance: Vec3::ONE, base: x, rise: 0.5 }), ..light() },
-            EnvironmentData { key: key_light(vector, Vec3::Y, 1.0), ..light() },
-            EnvironmentData { key: key_light(Vec3::ONE, vector, 1.0), ..light() },
-            EnvironmentData { key: key_light(Vec3::ONE, Vec3::Y, x), ..light() },
-            EnvironmentData { sky: Some(Sky { turbidity: x, ..Default::default() }), ..light() },
-            EnvironmentData { sky: Some(Sky { sun_elevation_deg: x, ..Default::default() }), ..light() },
-            EnvironmentData { sky: Some(Sky { sun: x, ground: vector, ..Default::default() }), ..light() },
-            EnvironmentData { sun: sun(vector, 1.0, Vec3::ONE), ..light() },
-            EnvironmentData { sun: sun(Vec3::Y, x, Vec3::ONE), ..light() },
-            EnvironmentData { sun: sun(Vec3::Y, 1.0, vector), ..light() },
-            EnvironmentData { image: Some(EnvironmentImage { file: "no.exr".into(), scale: x }), ..light() },
-        ];
-        let cameras = [
-            Camera { eye: vector, ..camera() },
-            Camera { target: vector, ..camera() },
-            Camera { fov_deg: x, ..camera() },
-        ];
-        let outputs = [
-            Output { width: x as u32, ..Default::default() },
-            Output { exposure_ev: Some(x), ..Default::default() },
-            Output { time_s: x.into(), ..Default::default() },
-        ];
-        let entities = entities.map(|entity| try_scene(entity, light(), camera(), Output::default()));
-        let lights = lights.map(|light| try_scene(entity(), light, camera(), Output::default()));
-        let cameras = cameras.map(|camera| try_scene(entity(), light(), camera, Output::default()));
-        let outputs = outputs.map(|output| try_scene(entity(), light(), camera(), output));
-        for is_built in entities.into_iter().chain(lights).chain(cameras).chain(outputs) {
-            built[usize::from(is_built)] += 1;
+fn scenes_of_odd_numbers_are_read_or_refused_in_one_line() {
+    let text = include_str!("../fuzz/corpus/toml/all_keys.toml");
+    let files = tempfile::tempdir().unwrap();
+    let sky = files.path().join("sky.exr");
+    picture::write_exr(&sky, 4, 2, &[0.5; 24]).unwrap();
+    let read = |path: &Path| match path.extension().and_then(|ending| ending.to_str()) {
+        Some("obj") => Ok(b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n".to_vec()),
+        _ => Ok(std::fs::read(&sky).unwrap()),
+    };
+    let is_part = |c: char| c.is_ascii_digit() || c == '.' || c == '-';
+    let begins = |at: &usize| text[*at..].starts_with(is_part) && text[..*at].ends_with([' ', '[']);
+    let mut outcomes = [0; 2];
+    for at in (0..text.len()).filter(begins) {
+        let end = text[at..].find(|c| !is_part(c)).map_or(text.len(), |length| at + length);
+        for odd in ODD {
+            let changed = format!("{}{odd}{}", &text[..at], &text[end..]);
+            let scene = one_line(Scene::parse(&changed, Path::new("odd.toml"), &read));
+            outcomes[usize::from(scene.is_some())] += 1;
+            let Some(scene) = scene else { continue };
+            for time_s in [0.0, -1e9, 1e9, f64::NAN, f64::INFINITY, f64::MAX] {
+                assert_eq!(scene.at(time_s).len(), scene.entities.len());
+            }
+            assert!(scene.at(0.0).iter().all(|placement| placement.position.is_finite()));
+            scene.environment.coefficients(4);
+            scene.data.camera.up();
+            one_line(scene.to_toml());
         }
     }
-    assert!(built.iter().all(|count| *count > 100), "refused and built: {built:?}");
+    assert!(outcomes.iter().all(|count| *count > 300), "refused and read: {outcomes:?}");
 }
 
 #[test]

@@ -1,6 +1,6 @@
 //! Meshes: generators against closed forms, derived properties, the enclosing sphere, and OBJ files.
 
-use crate::common::{generate, joined};
+use crate::common::{generate, inside_out, joined};
 use std::f64::consts::{PI, TAU};
 use std::path::Path;
 
@@ -136,10 +136,7 @@ fn bounding_sphere_is_smallest() {
         // The centre is rounded to f32: 6e-8 of coordinates up to 3, radii from about 0.1 on.
         assert!((f64::from(radius) - exact).abs() < 2e-6 * exact.max(0.1), "{radius} against {exact}");
     }
-}
-
-#[test]
-fn a_ball_far_away_has_its_bounding_sphere() {
+    // A ball far away.
     let moved: Vec<Vec3> = sphere(0.37, 4).positions.iter().map(|p| *p + Vec3::new(1000.0, -20.0, 3.0)).collect();
     let (centre, r) = enclose::bounding_sphere(&moved);
     assert!(centre.distance(Vec3::new(1000.0, -20.0, 3.0)) < 1e-4 && (r - 0.37).abs() < 1e-4);
@@ -170,7 +167,7 @@ fn shape_survives_rotation_and_refuses_defects() {
         |mesh: &Mesh, triangles| Mesh::new("x", mesh.positions.clone(), mesh.normals.clone(), None, triangles).unwrap();
     let ball = sphere(1.0, 2);
     assert!(!rebuild(&ball, ball.triangles[1..].to_vec()).is_closed(), "a hole");
-    assert!(!rebuild(&ball, ball.triangles.iter().map(|t| [t[0], t[2], t[1]]).collect()).is_closed(), "inside out");
+    assert!(!inside_out(&ball).is_closed(), "inside out");
     let mut one_turned = ball.triangles.clone();
     one_turned[5].swap(0, 1);
     assert!(!rebuild(&ball, one_turned).is_closed(), "one triangle turned over");
@@ -193,9 +190,7 @@ fn pieces_and_contacts() {
     let apart = beside(&cube, Vec3::X * 3.0);
     assert!(apart.is_closed() && !apart.is_convex() && apart.euler_characteristic() == 4);
     assert!(apart.is_solid() && sphere(1.0, 2).is_solid() && torus(1.0, 0.3, 12, 8).is_solid() && !pot().is_solid());
-    let turned = cube.triangles.iter().map(|t| [t[0], t[2], t[1]]).collect();
-    let wall = Mesh::new("wall", cube.positions.clone(), cube.normals.clone(), None, turned).unwrap();
-    let hollow = joined(&[(&cuboid(Vec3::splat(3.0), 1), Vec3::ZERO), (&wall, Vec3::ZERO)]);
+    let hollow = joined(&[(&cuboid(Vec3::splat(3.0), 1), Vec3::ZERO), (&inside_out(&cube), Vec3::ZERO)]);
     assert!(hollow.is_closed() && !hollow.is_solid(), "a hollow in a box");
     assert!(!beside(&cube, Vec3::ONE).is_closed(), "two boxes that share one corner are no manifold");
     assert!(!beside(&cube, Vec3::new(1.0, 1.0, 0.0)).is_closed(), "nor are two that share an edge");
@@ -263,15 +258,6 @@ fn obj_dialects() {
     assert_eq!((split.positions.len(), split.normals[0]), (6, Vec3::Z), "two normals at two of the positions");
     let colored = parse("v 0 0 0 1 0 0\nv 1 0 0 0 2 0\nv 0 1 0 0 0 .5\nf 1 2 3\n");
     assert_eq!(colored.colors.unwrap(), [Vec3::X, Vec3::Y * 2.0, Vec3::Z * 0.5]);
-}
-
-#[test]
-fn content_hash_tells_meshes_apart() {
-    let hashes: Vec<_> = library().iter().map(Mesh::content_hash).collect();
-    for (i, a) in hashes.iter().enumerate() {
-        assert!(hashes[i + 1..].iter().all(|b| a != b));
-    }
-    assert_ne!(torus(0.5, 0.15, 48, 20).content_hash(), torus_two_colour(0.5, 0.15, 48, 20).content_hash());
 }
 
 #[test]

@@ -16,7 +16,6 @@ fn read_text(text: &str, model: &Model) -> shadow_fields::Result<gltf::Import> {
 /// Accessors may lack a bufferView: their numbers are zeros.
 #[test]
 fn accessors_without_a_view_are_zeros() {
-    let mut copies = 0;
     for model in [room(), robot()] {
         let whole = load(&model).data;
         let count = model.json["accessors"].as_array().unwrap().len();
@@ -25,8 +24,8 @@ fn accessors_without_a_view_are_zeros() {
             changed.json["accessors"][index].as_object_mut().unwrap().remove("bufferView");
             let found = read(&changed, &Default::default()).unwrap_or_else(|error| panic!("accessor {index}: {error}"));
             assert!(found.data.entities.len() <= whole.entities.len(), "accessor {index}");
-            copies += 1;
         }
+        assert!(count > 5);
         let mut changed = Model { json: model.whole(), bytes: Vec::new() };
         for accessor in changed.json["accessors"].as_array_mut().unwrap() {
             accessor.as_object_mut().unwrap().remove("bufferView");
@@ -35,9 +34,7 @@ fn accessors_without_a_view_are_zeros() {
         assert!(found.data.entities.iter().all(|entity| entity.mesh == "lamp"), "nothing has an area");
         let notes = found.notes.left_out().join("\n");
         assert!(notes.contains("shapes without an area"), "{notes}");
-        copies += 1;
     }
-    assert!(copies > 20);
 }
 
 /// A channel without a node moves nothing: each is left out, and the others stay.
@@ -149,17 +146,13 @@ fn buffers_that_nothing_reads_need_no_bytes() {
         let last = json["accessors"].as_array().unwrap().len() - 1;
         json["meshes"][0]["primitives"][0]["indices"] = json!(last);
     };
-    for two in [
-        json!([{ "byteLength": length }, { "byteLength": 16 }]),
-        json!([{ "byteLength": length }, { "byteLength": 16, "name": "none" }]),
-    ] {
-        let changes: [&dyn Fn(&mut Value); 3] = [&|_| (), &view, &unread];
-        for more in changes {
-            assert_eq!(with(two.clone(), more).unwrap().data, load(&model).data);
-        }
-        let error = with(two, &drawn).err().unwrap().line();
-        assert!(error.contains("buffers[1]: only the first buffer may have no uri"), "{error}");
+    let two = json!([{ "byteLength": length }, { "byteLength": 16 }]);
+    let changes: [&dyn Fn(&mut Value); 3] = [&|_| (), &view, &unread];
+    for more in changes {
+        assert_eq!(with(two.clone(), more).unwrap().data, load(&model).data);
     }
+    let error = with(two, &drawn).err().unwrap().line();
+    assert!(error.contains("buffers[1]: only the first buffer may have no uri"), "{error}");
     let mut bare = Model::default();
     bare.json["buffers"] = json!([{ "byteLength": 4 }]);
     assert_eq!(load(&bare).data.entities.len(), 0, "there is no binary part");

@@ -1,6 +1,6 @@
 //! Primitives of several loose pieces, and lamps that are one quad.
 
-use crate::common::{generate, joined};
+use crate::common::{generate, inside_out, joined, part};
 use crate::model::{Model, bench};
 use glam::{Mat3, Quat, Vec3};
 use serde_json::json;
@@ -109,20 +109,13 @@ fn lamps_of_several_bulbs_are_several_lamps() {
 #[test]
 fn rooms_are_cut_into_their_walls() {
     let solid = generate::cuboid(Vec3::new(4.0, 2.5, 3.0), 2);
-    let is_front = |t: &[u32; 3]| t.iter().all(|&v| solid.normals[v as usize].z > 0.5);
-    let open: Vec<[u32; 3]> = solid.triangles.iter().filter(|triangle| !is_front(triangle)).copied().collect();
-    let inwards: Vec<[u32; 3]> = open.iter().map(|[a, b, c]| [*a, *c, *b]).collect();
-    let normals: Vec<Vec3> = solid.normals.iter().map(|normal| -*normal).collect();
-    let shell = |normals: &[Vec3], triangles: Vec<[u32; 3]>| {
-        Mesh::new("shell", solid.positions.clone(), normals.to_vec(), None, triangles).unwrap()
-    };
-    let walls = meshes(&[(&shell(&normals, inwards), Vec3::ZERO)], json!({}));
+    let open = part(&solid, |corners| corners.iter().any(|&v| solid.normals[v as usize].z < 0.5));
+    let walls = meshes(&[(&inside_out(&open), Vec3::ZERO)], json!({}));
     assert_eq!(walls.len(), 5);
     assert!(walls.iter().all(|mesh| mesh.rectangle().is_some()));
-    assert_eq!(meshes(&[(&shell(&solid.normals, open), Vec3::ZERO)], json!({})).len(), 1);
-    let closed: Vec<[u32; 3]> = solid.triangles.iter().map(|[a, b, c]| [*a, *c, *b]).collect();
+    assert_eq!(meshes(&[(&open, Vec3::ZERO)], json!({})).len(), 1);
     let ring = generate::torus(0.4, 0.1, 24, 12);
-    let both = meshes(&[(&shell(&normals, closed), Vec3::ZERO), (&ring, 9.0 * Vec3::X)], json!({}));
+    let both = meshes(&[(&inside_out(&solid), Vec3::ZERO), (&ring, 9.0 * Vec3::X)], json!({}));
     assert_eq!(both.len(), 1, "a box that may be inside out");
 }
 

@@ -1,5 +1,6 @@
 //! glTF as scenes: shapes, placements, lights and cameras of models that the tests make.
 
+use crate::common::generate;
 use crate::model;
 use glam::{DMat4, DQuat, DVec3, Quat, Vec3};
 use model::{F32, I8, I16, Model, U8, U16, U32, corners, cuboid, load, near, world};
@@ -291,13 +292,8 @@ fn lights_are_balls_of_their_intensity() {
 #[test]
 fn spots_shine_within_their_cone() {
     let mut model = Model::default();
-    let row = |z: f32| (0..17).flat_map(move |i| [i as f32 * 0.25 - 2.0, 0.0, z]);
-    let positions: Vec<f32> = row(0.0).chain(row(0.5)).collect();
-    let positions = model.positions(&positions);
-    let cell = |i: u16| [i, i + 17, i + 1, i + 1, i + 17, i + 18];
-    let indices = model.indices(&(0..16).flat_map(cell).collect::<Vec<u16>>());
     let paint = model.paint([1.0; 3]);
-    let mesh = model.mesh(json!({ "POSITION": positions }), Some(indices), Some(paint));
+    let mesh = model.shape(&generate::plane(4.0, 12), Some(paint));
     model.node(json!({ "name": "floor", "mesh": mesh }));
     let spot = json!({ "innerConeAngle": 0.3, "outerConeAngle": 0.6 });
     let light = model.light(json!({ "type": "spot", "intensity": 10, "color": [1, 0.5, 0.25], "spot": spot }));
@@ -362,13 +358,4 @@ fn a_file_is_one_mesh_where_a_mesh_is_wanted() {
     assert_box(&mesh.positions.iter().map(|p| p.as_dvec3()).collect::<Vec<_>>(), [-2., -1., -0.5], [0.5, 4., 2.]);
     assert_eq!(notes, gltf::Notes::default());
     assert!(shadow_fields::scene::load_mesh(Path::new("none.glb")).is_err());
-}
-
-#[test]
-fn scenes_load_by_their_ending() {
-    let (scene, notes) = model::scene(&arrows());
-    assert_eq!((scene.data.entities.len(), scene.data.meshes.len(), notes.left_out().len()), (4, 4, 0));
-    // A scene without light gets a sky, whose sun stands behind the entities of the file.
-    assert!(scene.entities[..4].iter().all(|entity| entity.occludes && entity.receives && !entity.emits));
-    assert!(scene.entities[4..].iter().all(|entity| entity.emits));
 }

@@ -1,18 +1,11 @@
 //! What a bake leaves out: samples that faces of the lattice share, and equal meshes.
 
 use crate::common::{generate, gpu, parse};
-use shadow_fields::asset::Mesh;
 use shadow_fields::bake::cache::Cache;
 use shadow_fields::bake::{self, SceneNeeds};
-use shadow_fields::field::{FieldHeader, FieldKind, Storage};
+use shadow_fields::field::FieldKind;
 use shadow_fields::scene::Scene;
 use shadow_fields::scene_buffers::SceneBuffers;
-
-fn header(mesh: &Mesh, lattice: &str) -> FieldHeader {
-    let lattice = lattice.parse().unwrap();
-    let options = bake::Options { lattice, storage: Storage::F32, face_px: 32, ..Default::default() };
-    bake::header(mesh, FieldKind::Occlusion, &options)
-}
 
 #[test]
 fn the_same_mesh_under_two_names_is_baked_once() {
@@ -50,7 +43,8 @@ fn the_same_mesh_under_two_names_is_baked_once() {
 fn what_faces_of_the_lattice_share_is_captured_once() {
     let Some(gpu) = gpu() else { return };
     let mesh = generate::sphere(1.0, 2);
-    let header = header(&mesh, "cube:2x5,edges");
+    let options = bake::Options { lattice: "cube:2x5,edges".parse().unwrap(), face_px: 32, ..Default::default() };
+    let header = bake::header(&mesh, FieldKind::Occlusion, &options);
     let nodes = (header.lattice.direction_count() / 6).isqrt();
     let (field, report) = gpu.baker().field(&mesh, header, &|_, _| ()).unwrap();
     let places = 6 * (nodes - 2).pow(2) + 12 * (nodes - 2) + 8;

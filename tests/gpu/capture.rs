@@ -1,7 +1,7 @@
 //! Capture on the device against rays cast on the host: coverage, culling, faces left out, and colours on the right
 //! faces.
 
-use crate::common::{Gpu, generate, gpu, joined};
+use crate::common::{generate, gpu, joined};
 use glam::{Quat, Vec3};
 use shadow_fields::asset::Mesh;
 use shadow_fields::bake::capture::{Capture, Model, NO_SLOT, Way};
@@ -10,13 +10,6 @@ use shadow_fields::field::FieldKind;
 
 const FACE_PX: u32 = 32;
 const WAYS: [Way; 2] = [Way::Drawn, Way::Computed];
-
-/// Texels of every eye's faces, 0 where the object is and 255 elsewhere; faces without a slot are `None`.
-fn coverage(gpu: &Gpu, mesh: &Mesh, eyes: &[Vec3], cull: bool, way: Way) -> Vec<[Option<Vec<u8>>; 6]> {
-    let found = faces(&gpu.baker(), mesh, eyes, (FACE_PX, FieldKind::Occlusion, cull), way).unwrap();
-    assert!(found.iter().flatten().flatten().flatten().all(|texel| [0, 255].contains(texel)));
-    found
-}
 
 fn tilted_plane() -> Mesh {
     let plane = generate::plane(2.0, 5);
@@ -71,8 +64,9 @@ fn culled_from_inside_a_solid_nothing_is_left() {
     let eyes = [Vec3::new(0.1, 0.2, -0.1)];
     for way in WAYS {
         let covered = |cull| {
-            let faces = &coverage(&gpu, &mesh, &eyes, cull, way)[0];
-            faces.iter().flatten().flatten().filter(|texel| **texel == 0).count()
+            let found = faces::<u8>(&gpu.baker(), &mesh, &eyes, (FACE_PX, FieldKind::Occlusion, cull), way).unwrap();
+            assert!(found.iter().flatten().flatten().flatten().all(|texel| [0, 255].contains(texel)));
+            found[0].iter().flatten().flatten().filter(|texel| **texel == 0).count()
         };
         assert_eq!(covered(true), 0, "{way:?}");
         assert_eq!(covered(false), 6 * (FACE_PX * FACE_PX) as usize, "{way:?}");

@@ -1,11 +1,11 @@
 //! Pictures: what stands where, what hides what, and in which colour.
 
 use crate::common::{Gpu, gpu, relative_rms};
-use crate::stage::{at, scene, small};
+use crate::stage::{at, holed, scene, shines, small, stands};
 use glam::{DVec2, EulerRot, Quat, Vec2, Vec3};
 use shadow_fields::asset::environment::EnvironmentData;
 use shadow_fields::asset::mesh::Attributes;
-use shadow_fields::asset::texture::{Texels, Texture, Wrap};
+use shadow_fields::asset::texture::Texture;
 use shadow_fields::asset::{Generator, Mesh};
 use shadow_fields::bake::Baker;
 use shadow_fields::draw::Antialias;
@@ -13,7 +13,6 @@ use shadow_fields::frame;
 use shadow_fields::scene::data::{Camera, EntityData};
 use shadow_fields::scene::{Albedo, Placement, Scene};
 use shadow_fields::shaders::Library;
-use std::sync::Arc;
 
 const WIDTH: usize = 96;
 const HEIGHT: usize = 64;
@@ -248,9 +247,7 @@ fn textures_multiply_the_light_of_a_grey_surface() {
         let corners = [[-2.0, -2.0, 0.0], [2.0, -2.0, 0.0], [2.0, 2.0, 0.0], [-2.0, 2.0, 0.0]];
         let mesh = quad(corners, Some(vec![Vec3::new(1.0, 0.25, 1.0); 4]));
         let rgba = vec![[255, 0, 0, 255], [0, 255, 0, 255], [0, 0, 255, 255], [255, 255, 255, 100]];
-        let texels = Some(Arc::new(Texels { width: 2, height: 2, rgba }));
-        let factor = Vec3::new(0.5, 1.0, 1.0);
-        let texture = Texture { texels, wrap: [Wrap::Clamp; 2], factor, alpha_cutoff: Some(0.5), alpha_blend: false };
+        let texture = Texture { factor: Vec3::new(0.5, 1.0, 1.0), ..holed(2, rgba) };
         let lamp = Generator::Sphere { radius_m: 0.1, subdivisions: 2 };
         let environment = EnvironmentData { uniform: Some(Vec3::splat(0.2)), ..EnvironmentData::default() };
         let scene = Scene::builder()
@@ -260,12 +257,8 @@ fn textures_multiply_the_light_of_a_grey_surface() {
             .mesh("wall", mesh)
             .mesh("ball", lamp)
             .entity(EntityData { albedo, ..EntityData::of_mesh("wall") })
-            .entity(EntityData { scale: 2.0, position: Vec3::new(0.5, 0.2, 0.6), ..EntityData::of_mesh("ball") })
-            .entity(EntityData {
-                position: Vec3::new(1.0, 1.0, 2.0),
-                emission: Vec3::splat(40.0),
-                ..EntityData::of_mesh("ball")
-            });
+            .entity(EntityData { scale: 2.0, ..stands("ball", [0.5, 0.2, 0.6]) })
+            .entity(shines("ball", [1.0, 1.0, 2.0], 40.0));
         let scene = scene.build().unwrap();
         let mut frame = gpu.frame(&scene, options(Antialias::Samples));
         let timings = frame.render(&scene.at(0.0), Some(f32::INFINITY)).unwrap();
@@ -307,12 +300,10 @@ fn textures_are_even_under_four_samples() {
     let Some(gpu) = gpu() else { return };
     let mesh = quad([[-2.0, -1.0, 2.0], [2.0, -1.0, 2.0], [2.0, 0.5, -8.0], [-2.0, 0.5, -8.0]], None);
     let rgba = (0..16 * 16).map(|i| [255 * (i as u8 % 2), 255 * (i / 16 % 2) as u8, 0, 255]).collect();
-    let texels = Some(Arc::new(Texels { width: 16, height: 16, rgba }));
-    let texture = Texture { texels, wrap: [Wrap::Clamp; 2], factor: Vec3::ONE, alpha_cutoff: None, alpha_blend: false };
     let scene = Scene::builder()
         .camera(Camera::new([0.0, 0.5, 5.0], [0.0, -0.2, 0.0]))
         .environment(EnvironmentData { uniform: Some(Vec3::ONE), ..EnvironmentData::default() })
-        .texture("checks", texture)
+        .texture("checks", Texture { alpha_cutoff: None, ..holed(16, rgba) })
         .mesh("floor", mesh)
         .entity(EntityData { albedo: Albedo::Texture("checks".into()), ..EntityData::of_mesh("floor") });
     let scene = scene.build().unwrap();

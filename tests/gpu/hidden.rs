@@ -1,11 +1,11 @@
 //! What the camera cannot see is not drawn, and no picture shows it.
 
-use crate::common::{Gpu, gpu};
+use crate::common::gpu;
 use crate::stage::{jostled, scene, small};
 use shadow_fields::draw::Antialias;
-use shadow_fields::frame::{self, Frame};
+use shadow_fields::frame;
 use shadow_fields::lists::skip::Skip;
-use shadow_fields::scene::{Camera, Placement, Scene};
+use shadow_fields::scene::{Camera, Scene};
 
 /// Solid, hollow and open things over a floor, one of them around the others.
 fn room() -> Scene {
@@ -29,17 +29,6 @@ fn camera(eye: [f32; 3], target: [f32; 3], fov_deg: f32) -> Camera {
     Camera { eye: eye.into(), target: target.into(), fov_deg }
 }
 
-/// Bits of a picture: as files have it, or as a window shows it.
-fn picture(frame: &mut Frame, placements: &[Placement]) -> Vec<u32> {
-    frame.render(placements, Some(1.0)).unwrap();
-    frame.picture().into_iter().map(f32::to_bits).collect()
-}
-
-fn pair(gpu: &Gpu, scene: &Scene, options: frame::Options) -> [Frame; 2] {
-    let without = frame::Options { skip: Skip::without("hidden"), ..options };
-    [gpu.frame(scene, options), gpu.frame(scene, without)]
-}
-
 /// Cameras in turn: one that wanders, one that jumps, one among the things, one inside a ball, one that looks away.
 fn eye(round: usize) -> Camera {
     let angle = round as f32 * 0.4;
@@ -58,7 +47,8 @@ fn pictures_are_the_same_to_the_bit() {
     let scene = room();
     for antialias in [Antialias::None, Antialias::Outlines, Antialias::Samples] {
         let options = frame::Options { size: [192, 128], antialias, ..small() };
-        let mut frames = pair(&gpu, &scene, options);
+        let without = frame::Options { skip: Skip::without("hidden"), ..options };
+        let mut frames = [gpu.frame(&scene, options), gpu.frame(&scene, without)];
         let mut placements = scene.at(0.0);
         let mut rng = fastrand::Rng::with_seed(5);
         for round in 0..24 {
@@ -73,7 +63,8 @@ fn pictures_are_the_same_to_the_bit() {
             }
             let pictures = frames.each_mut().map(|frame| {
                 frame.set_camera(&eye(round));
-                picture(frame, &placements)
+                frame.render(&placements, Some(1.0)).unwrap();
+                frame.picture().into_iter().map(f32::to_bits).collect::<Vec<u32>>()
             });
             assert!(pictures[0] == pictures[1], "{antialias:?}, round {round}, {movers:?} moved");
         }

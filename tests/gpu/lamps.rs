@@ -1,6 +1,7 @@
 //! Rooms that people build and their lamps: pictures beside rays.
 
-use crate::common::{Gpu, generate, gpu, relative_rms};
+use crate::common::{Gpu, generate, gpu, inside_out, part, relative_rms};
+use crate::stage::{shines, stands};
 use glam::{DQuat, Vec2, Vec3};
 use shadow_fields::asset::Mesh;
 use shadow_fields::asset::environment::EnvironmentData;
@@ -20,8 +21,9 @@ fn turned(axis: Vec3, angle_deg: f64) -> RotationData {
     RotationData::AxisAngle { axis, angle_deg }
 }
 
-fn slab(position: Vec3, rotation: RotationData) -> EntityData {
-    EntityData { position, rotation, ..EntityData::of_mesh("slab") }
+/// A slab that stands upright.
+fn wall(position: [f32; 3]) -> EntityData {
+    EntityData { rotation: turned(Vec3::X, 90.0), ..stands("slab", position) }
 }
 
 /// Relative RMS of a scene's picture against rays through its pixels, direct light alone.
@@ -44,28 +46,15 @@ fn picture_error(gpu: &Gpu, scene: &Scene) -> f64 {
 fn a_room_of_one_mesh_is_lit_by_its_ceiling_lamp() {
     let Some(gpu) = gpu() else { return };
     let solid = generate::cuboid(Vec3::splat(2.0), 1);
-    let is_front = |t: &[u32; 3]| t.iter().all(|&v| solid.normals[v as usize].z > 0.5);
-    let open = solid.triangles.iter().filter(|triangle| !is_front(triangle));
-    let inwards = open.map(|[a, b, c]| [*a, *c, *b]).collect();
-    let normals = solid.normals.iter().map(|normal| -*normal).collect();
-    let room = Mesh::new("room", solid.positions.clone(), normals, None, inwards).unwrap();
+    let open = part(&solid, |corners| corners.iter().any(|&v| solid.normals[v as usize].z < 0.5));
     let scene = Scene::builder()
         .camera(Camera::new([0.0, 0.0, 4.0], [0.0; 3]))
-        .mesh("room", room)
+        .mesh("room", inside_out(&open))
         .mesh("box", generate::cuboid(Vec3::new(0.6, 1.2, 0.6), 1))
         .mesh("lamp", Generator::Rectangle { size_m: [0.6, 0.5] })
         .entity(EntityData { albedo: Vec3::splat(0.7).into(), ..EntityData::of_mesh("room") })
-        .entity(EntityData {
-            position: Vec3::new(-0.35, -0.4, -0.3),
-            rotation: turned(Vec3::Y, 17.0),
-            ..EntityData::of_mesh("box")
-        })
-        .entity(EntityData {
-            position: Vec3::new(0.0, 0.99, 0.0),
-            rotation: turned(Vec3::X, 180.0),
-            emission: Vec3::splat(10.0),
-            ..EntityData::of_mesh("lamp")
-        });
+        .entity(EntityData { rotation: turned(Vec3::Y, 17.0), ..stands("box", [-0.35, -0.4, -0.3]) })
+        .entity(EntityData { rotation: turned(Vec3::X, 180.0), ..shines("lamp", [0.0, 0.99, 0.0], 10.0) });
     let error = picture_error(&gpu, &scene.build().unwrap());
     assert!(error < 0.06, "{error}");
 }
@@ -99,14 +88,10 @@ fn glass_around_a_bulb_takes_its_share() {
             .mesh("glass", glass)
             .mesh("bulb", Generator::Sphere { radius_m: 0.05, subdivisions: 2 })
             .mesh("post", generate::cuboid(Vec3::new(0.06, 0.3, 0.06), 1))
-            .entity(EntityData { position: Vec3::new(0.0, -0.05, 0.0), ..EntityData::of_mesh("slab") })
-            .entity(EntityData { position: Vec3::new(0.4, 0.15, 0.1), ..EntityData::of_mesh("post") })
-            .entity(EntityData { position: Vec3::new(0.0, 0.4, 0.0), opacity: 0.4, ..EntityData::of_mesh("glass") })
-            .entity(EntityData {
-                position: Vec3::new(0.0, 0.4, 0.02),
-                emission: Vec3::splat(10.0),
-                ..EntityData::of_mesh("bulb")
-            });
+            .entity(stands("slab", [0.0, -0.05, 0.0]))
+            .entity(stands("post", [0.4, 0.15, 0.1]))
+            .entity(EntityData { opacity: 0.4, ..stands("glass", [0.0, 0.4, 0.0]) })
+            .entity(shines("bulb", [0.0, 0.4, 0.02], 10.0));
         let error = picture_error(&gpu, &scene.build().unwrap());
         // 0.068 where vertices alone evaluate lights, and 0.3 or more without a share.
         assert!(error < 0.08, "{name}: {error}");
@@ -120,12 +105,12 @@ fn what_is_carried_together_shades_itself_as_at_rest() {
     let node = Node::still(Vec3::new(-0.2, 0.1, 0.0), DQuat::from_rotation_y(0.3), 0.9);
     let picture = |motion: Vec<Motion>| {
         let at = |mesh: &str, position: [f32; 3]| {
-            let entity = EntityData { position: position.into(), motion: motion.clone(), ..EntityData::of_mesh(mesh) };
+            let entity = EntityData { motion: motion.clone(), ..stands(mesh, position) };
             let place = EntityData { motion: vec![Motion::Node(Box::new(node.clone()))], ..entity.clone() }.at(0.0);
             let [x, y, z, w] = place.rotation.to_array();
             let rotation = RotationData::Quaternion([x, y, z, w]);
-            let stands = EntityData { position: place.position, rotation, scale: place.scale, ..entity.clone() };
-            if motion.is_empty() { stands } else { entity }
+            let at_rest = EntityData { position: place.position, rotation, scale: place.scale, ..entity.clone() };
+            if motion.is_empty() { at_rest } else { entity }
         };
         let scene = Scene::builder()
             .camera(Camera::new([0.3, 0.9, 2.2], [-0.1, 0.6, 0.0]))
@@ -177,14 +162,10 @@ fn under_a_shade(profile: &[[f32; 2]], height: f32) -> Scene {
         .mesh("slab", generate::cuboid(Vec3::new(4.0, 0.1, 4.0), 1))
         .mesh("shade", shade)
         .mesh("bulb", Generator::Sphere { radius_m: 0.04, subdivisions: 2 })
-        .entity(slab(Vec3::new(0.0, -0.05, 0.0), RotationData::default()))
-        .entity(slab(Vec3::new(0.0, 1.9, -1.0), turned(Vec3::X, 90.0)))
-        .entity(EntityData { position: Vec3::new(0.0, 0.65, 0.0), ..EntityData::of_mesh("shade") })
-        .entity(EntityData {
-            position: Vec3::new(0.0, height, 0.0),
-            emission: Vec3::splat(150.0),
-            ..EntityData::of_mesh("bulb")
-        });
+        .entity(stands("slab", [0.0, -0.05, 0.0]))
+        .entity(wall([0.0, 1.9, -1.0]))
+        .entity(stands("shade", [0.0, 0.65, 0.0]))
+        .entity(shines("bulb", [0.0, height, 0.0], 150.0));
     scene.build().unwrap()
 }
 
@@ -219,7 +200,7 @@ fn a_window_casts_a_patch_of_sunlight_and_its_highlight() {
             .environment(toml::from_str(sky).unwrap())
             .mesh("wall", wall_with_window())
             .mesh("floor", generate::cuboid(Vec3::new(4.0, 0.1, 4.0), 1))
-            .entity(EntityData { position: Vec3::new(0.0, -0.05, 0.0), gloss, ..EntityData::of_mesh("floor") })
+            .entity(EntityData { gloss, ..stands("floor", [0.0, -0.05, 0.0]) })
             .entity(EntityData::of_mesh("wall"));
         let error = picture_error(&gpu, &scene.build().unwrap());
         assert!(error < 0.11, "{error}");
@@ -234,14 +215,10 @@ fn no_light_comes_through_the_slab_above_a_lamp() {
         .camera(Camera::new([0.2, 2.4, 3.2], [0.0, 0.8, 0.0]))
         .mesh("slab", generate::cuboid(Vec3::new(2.4, 0.1, 2.4), 1))
         .mesh("lamp", generate::cuboid(Vec3::new(0.6, 0.03, 0.6), 1))
-        .entity(slab(Vec3::new(0.0, -0.05, 0.0), RotationData::default()))
-        .entity(slab(Vec3::new(0.0, 1.2, 0.0), RotationData::default()))
-        .entity(slab(Vec3::new(0.0, 1.1, -1.2), turned(Vec3::X, 90.0)))
-        .entity(EntityData {
-            position: Vec3::new(0.0, 1.08, 0.0),
-            emission: Vec3::splat(3.0),
-            ..EntityData::of_mesh("lamp")
-        });
+        .entity(stands("slab", [0.0, -0.05, 0.0]))
+        .entity(stands("slab", [0.0, 1.2, 0.0]))
+        .entity(wall([0.0, 1.1, -1.2]))
+        .entity(shines("lamp", [0.0, 1.08, 0.0], 3.0));
     let error = picture_error(&gpu, &scene.build().unwrap());
     assert!(error < 0.04, "{error}");
 }
@@ -256,10 +233,9 @@ fn several_lamps_leave_a_table_its_shadow() {
         .mesh("top", generate::cuboid(Vec3::new(1.4, 0.05, 0.8), 1))
         .mesh("lamp", generate::torus(0.03, 0.012, 16, 8))
         .entity(EntityData::of_mesh("floor"))
-        .entity(EntityData { position: Vec3::new(0.0, 0.75, -0.3), ..EntityData::of_mesh("top") });
+        .entity(stands("top", [0.0, 0.75, -0.3]));
     for x in [-0.45, 0.0, 0.4] {
-        let position = Vec3::new(x, 1.95, -0.2);
-        scene = scene.entity(EntityData { position, emission: Vec3::splat(9.0), ..EntityData::of_mesh("lamp") });
+        scene = scene.entity(shines("lamp", [x, 1.95, -0.2], 9.0));
     }
     let error = picture_error(&gpu, &scene.build().unwrap());
     assert!(error < 0.05, "{error}");

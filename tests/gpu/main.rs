@@ -15,7 +15,6 @@ mod lamps;
 mod layouts;
 mod light;
 mod merge;
-mod order;
 mod project;
 mod renderer;
 mod self_visibility;

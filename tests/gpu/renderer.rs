@@ -1,6 +1,7 @@
 //! The front door: scenes made in code, light and pictures by `Renderer`, and what it refuses.
 
 use crate::common::{gpu, parse};
+use crate::stage::{shines, stands};
 use glam::{Quat, Vec3};
 use shadow_fields::asset::environment::EnvironmentData;
 use shadow_fields::bake;
@@ -19,8 +20,8 @@ fn room() -> SceneBuilder {
         .mesh("ring", Generator::Torus { major_m: 0.4, minor_m: 0.15, segments: 16, sides: 8 })
         .mesh("lamp", Generator::Sphere { radius_m: 0.1, subdivisions: 2 })
         .entity(EntityData::of_mesh("floor"))
-        .entity(EntityData { position: Vec3::new(0.0, 0.6, 0.0), ..EntityData::of_mesh("ring") })
-        .entity(EntityData { position: Vec3::Y * 1.8, emission: Vec3::splat(30.0), ..EntityData::of_mesh("lamp") })
+        .entity(stands("ring", [0.0, 0.6, 0.0]))
+        .entity(shines("lamp", [0.0, 1.8, 0.0], 30.0))
 }
 
 fn small() -> RenderOptions {
@@ -159,22 +160,4 @@ fn a_renderer_lights_its_scene_at_once_and_refuses_what_is_no_placement() {
     ] {
         assert!(matches!(Renderer::new(&door, &scene, &options), Err(Error::Input(_))));
     }
-}
-
-/// A graphics card's memory cannot be mapped as a whole: what lies there is copied, and light and picture are the same.
-#[test]
-fn what_cannot_be_mapped_is_copied() {
-    let Some(gpu) = gpu() else { return };
-    let scene = room().build().unwrap();
-    let render = || {
-        let options = frame::Options { bake: Quality::Draft.options(), size: [96, 64], ..Default::default() };
-        let mut frame = gpu.frame(&scene, options);
-        frame.render(&scene.at(0.0), Some(1.0)).unwrap();
-        (frame.picture(), frame.radiosity(0).unwrap())
-    };
-    let mapped = render();
-    gpu.device.map_no_device_memory(true);
-    let copied = render();
-    gpu.device.map_no_device_memory(false);
-    assert!(mapped == copied);
 }

@@ -1,5 +1,4 @@
-//! Silhouette fields: a ball against the overlap of two discs, and whole meshes against
-//! rays.
+//! Silhouette fields: whole meshes against rays, and what lies between.
 
 use crate::common::{Gpu, generate, gpu, joined};
 use crate::self_visibility::light_rays;
@@ -27,37 +26,6 @@ fn blocked_light(field: &SilhouetteField, point: DVec3, normal: DVec3, light: &S
         }
     }
     sums
-}
-
-#[test]
-fn a_ball_blocks_what_two_discs_have_in_common() {
-    let Some(gpu) = gpu() else { return };
-    let field = bake(&gpu, &generate::sphere(0.5, 5), SilhouetteOptions::default());
-    let mut rng = fastrand::Rng::with_seed(3);
-    for angle_deg in [1.0_f64, 3.0, 8.0, 15.0, 30.0] {
-        let mut square = 0.0;
-        let mut worst = 0.0_f64;
-        for _ in 0..200 {
-            let axis = DVec3::from_array([0; 3].map(|_| 2.0 * rng.f64() - 1.0)).normalize();
-            let distance = 1.1 + 5.0 * rng.f64();
-            let point = -distance * axis;
-            let (a, _) = axis.any_orthonormal_pair();
-            let ball = (1.0 / distance).asin();
-            let angle = angle_deg.to_radians();
-            let off = (ball + angle) * rng.f64();
-            let toward = (axis * off.cos() + a * off.sin()).normalize();
-            let rays = light_rays(toward, angle, 1000, 0.0);
-            let exact = rays.filter(|ray| ray.angle_between(axis) < ball).count() as f64 / 1000.0;
-            let [blocked, whole] =
-                blocked_light(&field, point, toward, &SeenLight::new(1e6 * toward, 1e6 * angle.sin()));
-            let error = (blocked / whole - exact).abs();
-            square += error * error / 200.0;
-            worst = worst.max(error);
-        }
-        // Three sources: maps of 0.07 r a texel under the smallest light, and for the wider ones an outline that is a
-        // circle where a part of the light takes it for a straight line.
-        assert!(square.sqrt() < 0.04 && worst < 0.15, "{angle_deg} deg: rms {:.4}, worst {worst:.3}", square.sqrt());
-    }
 }
 
 /// Share of a light that rays find blocked, weighed by the cosine to +y.

@@ -1,17 +1,15 @@
 //! What lets light through, everywhere or by its holes.
 
 use crate::common::gpu;
-use crate::stage::{difference, scene, small};
+use crate::stage::{difference, holed, scene, shines, small, stands};
 use glam::{Vec2, Vec3};
-use shadow_fields::asset::Mesh;
 use shadow_fields::asset::environment::EnvironmentData;
 use shadow_fields::asset::mesh::Attributes;
-use shadow_fields::asset::texture::{Texels, Texture, Wrap};
+use shadow_fields::asset::{Generator, Mesh};
 use shadow_fields::draw::Antialias;
 use shadow_fields::scene::data::EntityData;
 use shadow_fields::scene::{Albedo, Scene};
 use shadow_fields::{bake, frame};
-use std::sync::Arc;
 
 const SKY: &str = "environment = { uniform = [1, 1, 1] }\n";
 const LAMP: &str = "[[entity]]\nmesh = \"ball\"\nscale = 0.2\nposition = [1, 3, 0.3]\nemission = [50, 50, 50]\n";
@@ -75,26 +73,17 @@ fn half_of_a_square(masked: bool) -> Scene {
     let square =
         Mesh::with_attributes("square", positions, Vec::new(), attributes, vec![[0, 2, 1], [0, 3, 2]]).unwrap();
     let rgba = (0..64 * 64).map(|i| [255, 255, 255, if i % 64 < 32 { 0 } else { 255 }]).collect();
-    let texels = Some(Arc::new(Texels { width: 64, height: 64, rgba }));
-    let mask =
-        Texture { texels, wrap: [Wrap::Clamp; 2], factor: Vec3::ONE, alpha_cutoff: Some(0.5), alpha_blend: false };
-    let floor = shadow_fields::asset::Generator::Plane { size_m: 4.0, cells: 20 }.build().unwrap();
-    let lamp = EntityData {
-        position: Vec3::new(1.0, 3.0, 0.3),
-        scale: 0.1,
-        emission: Vec3::splat(200.0),
-        ..EntityData::of_mesh("ball")
-    };
-    let square_entity = EntityData {
-        position: Vec3::new(0.0, 0.6, 0.0),
-        albedo: Albedo::Texture("mask".into()),
-        ..EntityData::of_mesh("square")
-    };
-    let builder = Scene::builder().environment(EnvironmentData { uniform: Some(Vec3::ONE), ..Default::default() });
-    let builder = builder.texture("mask", mask).mesh("floor", Arc::new(floor)).mesh("square", Arc::new(square));
-    let ball = shadow_fields::asset::Generator::Sphere { radius_m: 1.0, subdivisions: 2 }.build().unwrap();
-    let builder = builder.mesh("ball", Arc::new(ball)).entity(EntityData::of_mesh("floor"));
-    builder.entity(square_entity).entity(lamp).build().unwrap()
+    Scene::builder()
+        .environment(EnvironmentData { uniform: Some(Vec3::ONE), ..Default::default() })
+        .texture("mask", holed(64, rgba))
+        .mesh("floor", Generator::Plane { size_m: 4.0, cells: 20 })
+        .mesh("square", square)
+        .mesh("ball", Generator::Sphere { radius_m: 1.0, subdivisions: 2 })
+        .entity(EntityData::of_mesh("floor"))
+        .entity(EntityData { albedo: Albedo::Texture("mask".into()), ..stands("square", [0.0, 0.6, 0.0]) })
+        .entity(EntityData { scale: 0.1, ..shines("ball", [1.0, 3.0, 0.3], 200.0) })
+        .build()
+        .unwrap()
 }
 
 /// By rays where nothing moves, else by what is captured of the shape without its holes.

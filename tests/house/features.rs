@@ -20,13 +20,13 @@ fn crates(features: &[&str]) -> BTreeSet<String> {
 
 #[test]
 fn the_library_alone_has_no_crate_of_the_program_or_the_window() {
-    let has = |all: &BTreeSet<String>, name: &&str| all.contains(*name);
-    let (alone, program, all) =
-        (crates(&["--no-default-features"]), crates(&["--no-default-features", "--features", "cli"]), crates(&[]));
-    for name in PROGRAM.iter().chain(&WINDOW) {
-        assert!(!has(&alone, name), "the library alone brings {name}");
-        assert!(has(&all, name), "{name} is gone: take it off the list");
+    let [alone, program, all] =
+        [&["--no-default-features"][..], &["--no-default-features", "--features", "cli"], &[]].map(crates);
+    for (names, in_program) in [(&PROGRAM[..], true), (&WINDOW, false)] {
+        for name in names {
+            let found = [&alone, &program, &all].map(|crates| crates.contains(*name));
+            assert_eq!(found, [false, in_program, true], "{name}: the library alone, the program, all");
+        }
     }
-    assert!(PROGRAM.iter().all(|name| has(&program, name)) && !WINDOW.iter().any(|name| has(&program, name)));
-    assert!(alone.contains("ash") && alone.len() < program.len() && program.len() < all.len());
+    assert!(alone.contains("ash"));
 }

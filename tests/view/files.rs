@@ -1,6 +1,6 @@
 //! Time, the next scene, and what is saved.
 
-use super::{SMALL, built_in, edit, from_text};
+use super::{SMALL, built_in, from_text};
 use glam::DVec3;
 use shadow_fields::asset::embedded;
 use shadow_fields::scene::Scene;
@@ -171,7 +171,7 @@ fn edits_that_would_be_lost_are_saved_beside_the_scene() {
     editor.apply(Command::Zoom(2.0));
     editor.apply(Command::SelectNext);
     assert_eq!((editor.is_edited(), editor.rescue().unwrap()), (false, None), "a look is no edit");
-    editor.apply(edit());
+    editor.apply(Command::SetExposure(0.75));
     assert!(editor.is_edited());
     editor.apply(Command::Undo);
     assert!(!editor.is_edited(), "what was taken back is no edit");
@@ -187,7 +187,7 @@ fn edits_are_saved_elsewhere_where_the_folder_cannot_be_written() {
     // A file in a folder in which nobody can make files.
     let path = Path::new("/proc/version");
     let mut editor = Editor::new(from_text(SMALL).scene().clone(), path);
-    editor.apply(edit());
+    editor.apply(Command::SetExposure(0.75));
     let said = editor.rescued(shadow_fields::Error::Failed("gone".into())).to_string();
     let saved = said.strip_prefix("gone; the edited scene was saved as ").unwrap();
     assert!(Scene::load(Path::new(saved)).is_ok(), "{said}");

@@ -40,8 +40,6 @@ fn a_gltf_file_is_edited_and_saved_as_a_scene_file() {
     let hashes = |scene: &Scene| scene.meshes.iter().map(|mesh| mesh.content_hash()).collect::<Vec<_>>();
     assert_eq!(hashes(&again), hashes(editor.scene()));
     assert_eq!(again.data.entities, editor.scene().data.entities);
-    // Saved again, it overwrites what it wrote.
-    editor.save(&saved).unwrap();
 }
 
 #[test]

@@ -19,7 +19,7 @@ mod model;
 use glam::DVec3;
 use shadow_fields::draw::camera::clip_from_world;
 use shadow_fields::scene::Scene;
-use shadow_fields::view::{Command, Editor};
+use shadow_fields::view::Editor;
 use std::path::Path;
 
 fn built_in(name: &str) -> Editor {
@@ -39,11 +39,6 @@ const SMALL: &str = "[camera]\neye = [0, 2, 5]\ntarget = [0, 0.5, 0]\n[output]\n
     [[entity]]\nmesh = \"floor\"\n[[entity]]\nmesh = \"ball\"\nposition = [0, 0.5, 0]\nalbedo = [0.8, 0.4, 0.2]\n\
     [[entity]]\nname = \"lamp\"\nmesh = \"ball\"\nposition = [1.5, 2, 0]\nscale = 0.5\nemission = [40, 40, 30]\n\
     motion = [{ orbit = { centre = [0, 2, 0], period_s = 4 } }]\n";
-
-/// An edit.
-fn edit() -> Command {
-    Command::SetExposure(0.75)
-}
 
 fn picture_place(editor: &Editor, point: DVec3) -> [f32; 2] {
     let [width, height] = editor.size().map(f64::from);

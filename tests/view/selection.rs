@@ -40,13 +40,8 @@ fn brute_force(editor: &Editor, origin: DVec3, direction: DVec3) -> Option<(usiz
             let t = origin - a;
             let (u, v) = (t.dot(p) / determinant, direction.dot(t.cross(e)) / determinant);
             let along = f.dot(t.cross(e)) / determinant;
-            if determinant != 0.0
-                && u >= 0.0
-                && v >= 0.0
-                && u + v <= 1.0
-                && along > 0.0
-                && best.is_none_or(|b| along < b.1)
-            {
+            let is_inside = determinant != 0.0 && u >= 0.0 && v >= 0.0 && u + v <= 1.0;
+            if is_inside && along > 0.0 && best.is_none_or(|b| along < b.1) {
                 best = Some((index, along));
             }
         }

@@ -203,31 +203,6 @@ fn keys_that_wait_cost_one_rebuild() {
     as_rendered(&mut stand, "after nine");
 }
 
-/// A scene that is panned out of sight, changed there, and panned back, however edges are smoothed.
-#[test]
-fn a_scene_out_of_sight_is_shown_and_comes_back() {
-    for antialias in [Antialias::None, Antialias::Outlines, Antialias::Samples] {
-        let Some(mut stand) = Stand::with(&format!("out-{antialias:?}"), |setup| setup.frame.antialias = antialias)
-        else {
-            return;
-        };
-        stand.ready();
-        let first = stand.shown();
-        let away = 100.0 * SIZE[0] as f32;
-        stand.viewer.apply(Command::Pan([away, 0.0])).unwrap();
-        let empty = stand.shown();
-        assert!(empty.iter().all(|pixel| *pixel == empty[0]), "{antialias:?}: the background alone");
-        stand.viewer.apply(Command::SetSky(0.5)).unwrap();
-        let darker = stand.shown();
-        assert!(darker.iter().all(|pixel| *pixel == darker[0]) && darker[0] != empty[0], "{antialias:?}: it changes");
-        stand.viewer.apply(Command::SetSky(1.0)).unwrap();
-        assert_eq!(apart(&stand.shown(), &empty), 0);
-        stand.turn();
-        stand.viewer.apply(Command::Pan([-away, 0.0])).unwrap();
-        assert_eq!(apart(&stand.shown(), &first), 0, "{antialias:?}: it is back");
-    }
-}
-
 #[test]
 fn the_overlay_and_the_reference_are_drawn() {
     let Some(mut stand) = Stand::new("overlay") else { return };

@@ -45,18 +45,6 @@ fn agree(a: &[Vec<f64>; 3], b: &[Vec<f64>; 3], tolerance: f64) {
     }
 }
 
-#[test]
-fn none_and_uniform() {
-    let none = build(&EnvironmentData::default());
-    assert!(none.is_none() && none.coefficients(4).iter().flatten().all(|c| *c == 0.0));
-    let uniform = build(&EnvironmentData { uniform: Some(Vec3::new(0.5, 1.0, 2.0)), ..Default::default() });
-    assert_eq!(uniform.radiance(DVec3::Y), [0.5, 1.0, 2.0]);
-    let c = uniform.coefficients(4);
-    for (channel, radiance) in c.iter().zip([0.5, 1.0, 2.0]) {
-        assert!((channel[0] - radiance * (4.0 * PI).sqrt()).abs() < 1e-12 && channel[1..].iter().all(|v| *v == 0.0));
-    }
-}
-
 /// Sources add: each stands beside a uniform sky.
 #[test]
 fn gradient_and_key_match_the_rule() {

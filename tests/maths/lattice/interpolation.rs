@@ -1,11 +1,8 @@
 //! Which samples a lookup takes, and by what weights.
 
 use super::{ROUNDING, interpolate, lattices, noise, store};
-use crate::common::generate;
 use fastrand::Rng;
 use glam::DVec3;
-use shadow_fields::bake;
-use shadow_fields::field::{FieldHeader, FieldKind, Lattice, ShadowField, Storage};
 use shadow_fields::sh::quadrature::random_direction;
 
 #[test]
@@ -55,39 +52,6 @@ fn linear_in_the_shell_coordinate_is_exact() {
             let wanted = 3.0 - 0.25 * (slope * lattice.coordinate(d) + offset);
             let value = interpolate(&lattice, &stored, d * random_direction(&mut rng));
             assert!((value - wanted).abs() < ROUNDING, "{lattice} {d}: {value}, not {wanted}");
-        }
-    }
-}
-
-#[test]
-fn lookup_of_a_field_is_the_lattice_and_the_factor() {
-    let mut rng = Rng::with_seed(8);
-    let lattice: Lattice = "cube:4x3,inner=1.02".parse().unwrap();
-    let captured = noise(&lattice, &mut rng);
-    let stored = store(&lattice, &captured);
-    let header = FieldHeader {
-        lattice,
-        ..bake::header(&generate::sphere(1.0, 1), FieldKind::Radiance, &bake::Options::default())
-    };
-    let header = FieldHeader { bands: 2, storage: Storage::F32, radiance_scale: 2.5, ..header };
-    // Channel and coefficient as multiples of the value, so that a swapped index shows.
-    let payload = stored
-        .iter()
-        .flat_map(|v| (0..12).map(move |k| (v * f64::from(k + 1)) as f32))
-        .flat_map(f32::to_le_bytes)
-        .collect();
-    let field = ShadowField { header, payload };
-    assert_eq!(field.header.payload_bytes(), field.payload.len() as u64);
-    for _ in 0..300 {
-        let position = random_direction(&mut rng) * (0.3 + 12.0 * rng.f64());
-        for channel in 0..3 {
-            let mut out = [0.0; 4];
-            field.lookup(position, channel, &mut out);
-            let value = 2.5 * interpolate(&lattice, &stored, position) * lattice.unscale(position.length());
-            for (k, found) in out.into_iter().enumerate() {
-                let wanted = value * (4 * channel + k + 1) as f64;
-                assert!((found - wanted).abs() < 1e-6 * wanted.abs() + 1e-9, "{position}: {found}, not {wanted}");
-            }
         }
     }
 }

@@ -115,7 +115,6 @@ fn samples_lie_on_their_shells() {
             let unit = lattice.direction(direction);
             assert!((unit.length() - 1.0).abs() < 1e-14, "{lattice}: direction {direction}");
             let position = lattice.position(index);
-            assert!((position.length() - lattice.shell(shell)).abs() < 1e-12 * lattice.outer, "{lattice}");
             assert!((position - lattice.shell(shell) * unit).length() < 1e-12 * lattice.outer, "{lattice}");
         }
     }
@@ -145,25 +144,6 @@ fn fitted_lattices_are_round_ones_in_their_own_space() {
     assert_eq!(chosen.fitted(Fit::ROUND, |_| 0.5), chosen);
     assert_eq!(fitted.fitted(flat, |_| 0.5), fitted);
     assert_eq!(round.fitted(flat, |_| 0.5).fit(), Fit::ROUND, "a first shell of its own");
-}
-
-#[test]
-fn directions_cover_the_sphere_evenly() {
-    // The mean of an odd function vanishes by symmetry; that of x^2 is 1/3 only when cells are nearly equal.
-    let lattice: Lattice = "cube:2x7,inner=1.02".parse().unwrap();
-    let count = lattice.direction_count();
-    let all: Vec<DVec3> = (0..count).map(|i| lattice.direction(i)).collect();
-    assert!(all.iter().sum::<DVec3>().length() < 1e-12);
-    let nearest = |v: DVec3| all.iter().map(|w| w.angle_between(v)).fold(f64::MAX, f64::min);
-    let mut rng = Rng::with_seed(1);
-    let farthest = (0..2000).map(|_| nearest(random_direction(&mut rng))).fold(0.0, f64::max);
-    // Cells of 90 / 7 = 12.9 degrees: half a diagonal is 9.1 degrees at a face's centre.
-    assert!(farthest < 9.6_f64.to_radians(), "{} degrees from the nearest sample", farthest.to_degrees());
-    for (i, a) in all.iter().enumerate() {
-        let near =
-            all.iter().enumerate().filter(|(k, _)| *k != i).map(|(_, b)| a.angle_between(*b)).fold(4.0, f64::min);
-        assert!(near > 5.0_f64.to_radians(), "sample {i} has a neighbour {} degrees away", near.to_degrees());
-    }
 }
 
 #[test]

@@ -83,14 +83,10 @@ fn parts_add_up() {
         for whole in rectangles(height) {
             let cut = [0, 1].map(|axis| 0.4 * whole.low[axis] + 0.6 * whole.high[axis]);
             let mut sum = [0.0; POLYGON_COEFFICIENTS];
-            for (x, y) in [(false, false), (true, false), (false, true), (true, true)] {
-                let side = |upper: bool, axis: usize| match upper {
-                    true => (cut[axis], whole.high[axis]),
-                    false => (whole.low[axis], cut[axis]),
-                };
-                let (left, right) = side(x, 0);
-                let (near, far) = side(y, 1);
-                let part = Rectangle { low: [left, near], high: [right, far], ..whole };
+            let ends = [0, 1].map(|axis| [whole.low[axis], cut[axis], whole.high[axis]]);
+            for [x, y] in [[0, 0], [1, 0], [0, 1], [1, 1]] {
+                let [low, high] = [0, 1].map(|end| [ends[0][x + end], ends[1][y + end]]);
+                let part = Rectangle { low, high, ..whole };
                 sum.iter_mut().zip(part.blocked()).for_each(|(sum, b)| *sum += b);
             }
             let off = worst(&sum, &whole.blocked());

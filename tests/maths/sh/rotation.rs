@@ -60,14 +60,3 @@ fn the_program_that_is_printed_equals_the_rotation() {
         }
     }
 }
-
-#[test]
-fn turns_are_cosines_and_sines_of_the_same_rotation() {
-    let mut rng = Rng::with_seed(14);
-    for _ in 0..100 {
-        let rotation = random_rotation(&mut rng);
-        let [a, b, c] = [0, 2, 4].map(|i| turns(rotation)[i + 1].atan2(turns(rotation)[i]));
-        let composed = DQuat::from_rotation_z(a) * DQuat::from_rotation_y(b) * DQuat::from_rotation_z(c);
-        assert!(composed.dot(rotation).abs() > 1.0 - 1e-12, "{rotation} {composed}");
-    }
-}

@@ -3,7 +3,7 @@ layout(binding = MIRROR_BINDING) uniform sampler2D mirror_levels; // alpha: 1, o
 layout(binding = MIRROR_BINDING + 1) uniform sampler2D mirror_far; // what depth leaves of 1
 
 // Shares of the way behind the mirror: less is that of something which touches it, and so many times more is beyond.
-const float TOUCHES = 0.02;
+const float TOUCHES = 0.1;
 const float PAST_GAP = 4.0;
 
 // Share of the mirror's picture in what a pixel reflects: 0 off the plane.
@@ -24,14 +24,19 @@ vec2 within_part(vec2 place, vec2 ends, float level) {
     return vec2(clamp(place.x, ends.x + rim, ends.y - rim), place.y);
 }
 
-// A place, or the nearest texel beside it where something touches the mirror: through the gap under that, what lies beyond
-// is seen. `scale` makes a depth the share of the way that is behind the mirror.
-vec2 before_gap(vec2 place, vec2 size, float scale) {
-    vec2 corner = floor(place - 0.5);
-    vec4 far = textureGather(mirror_far, (corner + 1.0) / size);
-    float least = min(min(far.x, far.y), min(far.z, far.w)), most = max(max(far.x, far.y), max(far.z, far.w));
-    vec2 texel = vec2(least == far.z || least == far.y ? 1.0 : 0.0, least == far.x || least == far.y ? 1.0 : 0.0);
-    return least * scale < TOUCHES && most > PAST_GAP * least ? corner + 0.5 + texel : place;
+// A place, or the texel beside it of something that touches the mirror: through the gap under that, what lies beyond is
+// seen. `scale` makes a depth the share of the way that is behind the mirror.
+vec2 before_gap(vec2 place, vec2 ends, float scale) {
+    ivec2 texel = ivec2(place), nearest = texel;
+    float least = texelFetch(mirror_far, texel, 0).x, most = least;
+    for (int i = 0; i < 9; i++) {
+        ivec2 at = clamp(texel + ivec2(i % 3, i / 3) - 1, ivec2(ends.x, 0), ivec2(ends.y, textureSize(mirror_far, 0).y) - 1);
+        float far = texelFetch(mirror_far, at, 0).x;
+        nearest = far < least ? at : nearest;
+        least = min(far, least);
+        most = max(far, most);
+    }
+    return least * scale < TOUCHES && most > PAST_GAP * least ? vec2(nearest) + 0.5 : place;
 }
 
 // Radiance of what stands there, and the share of the lobe that it fills.
@@ -39,7 +44,7 @@ vec4 mirrored_light(GlossEntity entity, float alpha) {
     vec2 size = vec2(textureSize(mirror_levels, 0)), ends = entity.mirror_view.xy;
     vec2 place = (gl_FragCoord.xy * entity.mirror_place.xy + vec2(entity.mirror_place.z, 0.0)) * size;
     float scale = entity.mirror_view.w / gl_FragCoord.w, widest = MIRROR_SPREAD * alpha * entity.mirror_view.z;
-    place = before_gap(within_part(place, ends, 0.0), size, scale);
+    place = before_gap(within_part(place, ends, 0.0), ends, scale);
     // How far behind the mirror that is, as a share of the way: the least of means around the place, for the wider ones
     // hold what lies beyond something that touches the mirror.
     float coarse = blur_level(0.5 * widest), far = 1.0;

@@ -146,6 +146,22 @@ entity = [
 ]
 "#;
 
+/// A floor in front of a wall does not mirror the bright one behind that.
+const GAP: &str = r#"
+mesh = [
+    { name = "floor", plane = { size_m = 5, cells = 40 } },
+    { name = "wall", cuboid = { size_m = [5, 1.5, 0.1], cells = 12 } },
+    { name = "lamp", sphere = { radius_m = 0.1, subdivisions = 2 } },
+]
+entity = [
+    { mesh = "floor", albedo = [0.05, 0.05, 0.05], gloss = { roughness = 0.35 } },
+    { mesh = "wall", position = [0, 0.75, -0.5], albedo = [0.2, 0.2, 0.2] },
+    { mesh = "wall", position = [0, 0.75, -1.5], albedo = [0.2, 0.3, 0.9] },
+    { mesh = "lamp", position = [0, 0.9, -1], emission = [400, 400, 400], receives = false },
+    { mesh = "lamp", position = [-1, 0.8, 1.5], emission = [40, 40, 40], receives = false },
+]
+"#;
+
 /// A polished floor and a polished wall show a ball that moves, each at its place, and no lamp twice.
 const FLAT: &str = r#"
 mesh = [
@@ -188,6 +204,8 @@ fn surfaces_mirror_what_stands_around_them() {
     for (name, text, first, most) in [
         // 0.26 where its vertices look along their links, 0.38 by the mean of these.
         ("near", NEAR, half, 0.2),
+        // 0.30 where blurs and filters reach over the contact.
+        ("gap", GAP, half, 0.14),
         ("flat", FLAT, 0, 0.15),
         // 0.062 on an H200; 0.097 where its vertices reflect, on llvmpipe.
         ("curved", CURVED, half, 0.075),

@@ -9,7 +9,7 @@ use crate::error::Result;
 use ash::vk;
 use std::ffi::{CStr, CString};
 use std::path::PathBuf;
-use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering};
+use std::sync::atomic::{AtomicU64, AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex};
 
 /// The caller's choices for a device.
@@ -59,7 +59,6 @@ pub struct Device {
     pub(super) next_resource: AtomicU64,
     pub(super) allocated_bytes: AtomicU64,
     omitted_barrier: AtomicUsize,
-    maps_no_device_memory: AtomicBool,
     /// Last: the instance outlives the device.
     pub(super) instance: Arc<Instance>,
 }
@@ -149,7 +148,6 @@ impl Device {
             next_resource: AtomicU64::new(1),
             allocated_bytes: AtomicU64::new(0),
             omitted_barrier: AtomicUsize::new(usize::MAX),
-            maps_no_device_memory: AtomicBool::new(false),
             instance: instance.clone(),
         };
         device.pipeline_cache = device.load_pipeline_cache()?;
@@ -190,16 +188,6 @@ impl Device {
 
     pub(super) fn omitted_barrier(&self) -> usize {
         self.omitted_barrier.load(Ordering::Relaxed)
-    }
-
-    /// From now on buffers in device memory are copied to and from, as where the host cannot map that memory. For tests
-    /// on software devices, which have one kind of memory.
-    pub fn map_no_device_memory(&self, no: bool) {
-        self.maps_no_device_memory.store(no, Ordering::Relaxed);
-    }
-
-    pub(super) fn maps_no_device_memory(&self) -> bool {
-        self.maps_no_device_memory.load(Ordering::Relaxed)
     }
 
     /// The driver's compiled pipelines on disk. Only what this program wrote, for this very device, reaches a driver.

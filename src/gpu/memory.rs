@@ -126,7 +126,7 @@ impl Buffer {
         // freeing.
         let mapped = unsafe {
             device.handle.bind_buffer_memory(buffer, memory.handle, 0).checked("vkBindBufferMemory", name)?;
-            if memory.host_coherent && !(kind == BufferKind::Device && device.maps_no_device_memory()) {
+            if memory.host_coherent {
                 let pointer = device
                     .handle
                     .map_memory(memory.handle, 0, vk::WHOLE_SIZE, vk::MemoryMapFlags::empty())

@@ -81,6 +81,15 @@ pub struct Library {
 impl Library {
     /// Compiles a permutation, or reads it from the cache.
     pub fn shader(&self, row: &ShaderPermutation) -> Result<Shader> {
+        self.compiled(row, false)
+    }
+
+    /// The same with its loops unrolled, whose arithmetic can be counted.
+    pub fn unrolled(&self, row: &ShaderPermutation) -> Result<Shader> {
+        self.compiled(row, true)
+    }
+
+    fn compiled(&self, row: &ShaderPermutation, optimised: bool) -> Result<Shader> {
         let stage = match row.file.rsplit('.').next() {
             Some("comp") => Stage::Compute,
             Some("vert") => Stage::Vertex,
@@ -101,8 +110,8 @@ impl Library {
             Some(generated) => generate(generated, row),
             None => self.text(name).ok(),
         };
-        let source =
-            ShaderSource { name: row.file, stage, text: self.text(row.file)?, defines: &defines, include: &include };
+        let text = self.text(row.file)?;
+        let source = ShaderSource { name: row.file, stage, text, defines: &defines, optimised, include: &include };
         Shader::compile(&source, self.cache_dir.as_deref())
     }
 

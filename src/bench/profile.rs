@@ -79,7 +79,7 @@ pub fn made_up(
     let mut rows = Vec::new();
     for (variant, times) in chosen.iter().zip(workload.time(library, chosen, runs)?) {
         let times = times.ok_or_else(|| Error::Failed(format!("the driver does not compile {}", variant.name)))?;
-        let flops = census::flops(&library.shader(&workload.permutation(*variant).row())?)?;
+        let flops = census::flops(&library.unrolled(&workload.permutation(*variant).row())?)?;
         rows.push(ProfileRow::merge(&case, variant.name, &times, workload.pairs(), flops, at_best));
     }
     Ok(rows)
@@ -114,7 +114,7 @@ pub fn scene(
     }
     let mut rows = Vec::new();
     for (variant, frame, times) in &merges {
-        let flops = census::flops(&bench.baker.library().shader(&frame.permutation().row())?)?;
+        let flops = census::flops(&bench.baker.library().unrolled(&frame.permutation().row())?)?;
         let pairs = 64 * frame.merged().merged_entries as u64;
         rows.push(ProfileRow::merge(name, variant.name, times, pairs, flops, at_best));
     }

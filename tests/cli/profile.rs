@@ -11,7 +11,7 @@ fn a_round_of_a_loop_is_counted() {
     let flops = |kind: u32| {
         let row = ShaderPermutation::new("ceiling.comp", 4).define("KIND", kind).define("READS", 16_u32);
         let row = row.define("ROUNDS", 64_u32).define("MASK", 1023_u32);
-        census::flops(&library().shader(&row).unwrap()).unwrap()
+        census::flops(&library().unrolled(&row).unwrap()).unwrap()
     };
     assert_eq!(flops(0), 16 * 4 * 2, "sixteen vectors of four, multiplied and added");
     assert_eq!(flops(1), 16 * 4, "sixteen texels, each added");

@@ -631,13 +631,11 @@ impl GroupSpace<'_> {
                     };
                     let middles =
                         || around.get_or_init(|| triangles_around(&mesh))[v].iter().map(|&triangle| middle(triangle));
-                    let after = |triangle: u32| {
-                        let corners = mesh.triangles[triangle as usize];
-                        let at = corners.iter().position(|&corner| corner as usize == v).unwrap_or(0);
-                        mesh.positions[corners[(at + 1) % 3] as usize]
+                    let neighbours = || {
+                        let triangles = around.get_or_init(|| triangles_around(&mesh))[v].iter();
+                        let corners = triangles.flat_map(|&triangle| mesh.triangles[triangle as usize]);
+                        corners.filter(|corner| *corner as usize != v).map(|corner| mesh.positions[corner as usize])
                     };
-                    let neighbours =
-                        || around.get_or_init(|| triangles_around(&mesh))[v].iter().map(|&triangle| after(triangle));
                     let free = |place: &Vec3| !self.see(*place, normal, nudge, Rays::Few).buried;
                     let mut inwards = WAYS_OUT.iter().flat_map(|way| middles().map(|m| position.lerp(m, *way)));
                     let along = || {

@@ -60,12 +60,14 @@ pub struct Runs {
     firsts: Vec<[u32; RUNS.len()]>,
     vertex_counts: Vec<usize>,
     count: u32,
+    /// Of every run, whether it has vertices of different sides, as of both faces of a wall; empty where links are known.
+    pub mixed: Vec<bool>,
 }
 
 impl Runs {
     /// For members with so many vertices.
     pub fn new(vertex_counts: impl IntoIterator<Item = usize>) -> Self {
-        let mut runs = Runs { firsts: Vec::new(), vertex_counts: Vec::new(), count: 0 };
+        let mut runs = Runs { firsts: Vec::new(), vertex_counts: Vec::new(), count: 0, mixed: Vec::new() };
         for vertices in vertex_counts {
             runs.firsts.push(RUNS.map(|size| {
                 let first = runs.count;
@@ -193,8 +195,8 @@ fn is_one(size: usize, a: &Met, b: &Met) -> bool {
 }
 
 /// Links the parts of a run that was met, so far as it may not stand for them; then the rays of all others. A run of
-/// which the rays met less than half of the parts stands for none: the others may be the far side of a wall, and all
-/// that is lit there would shine through it.
+/// which the rays met less than half of the parts stands for none, and neither does one of several sides of which they
+/// did not meet all: the others may be the far side of a wall, and all that is lit there would shine through it.
 fn join(size: usize, met: &[Met], runs: &Runs, links: &mut Vec<(u32, Bundle)>) -> Option<Bundle> {
     if size == 0 {
         return Some(Bundle::of(met.iter().map(|met| Bundle { share: met.share, toward: met.share * met.toward })));
@@ -211,7 +213,10 @@ fn join(size: usize, met: &[Met], runs: &Runs, links: &mut Vec<(u32, Bundle)>) -
             None => is_whole = false,
         }
     }
-    if is_whole && 2 * met_parts >= runs.parts(runs.of(size, met)).len() {
+    let number = runs.of(size, met);
+    let parts = runs.parts(number).len();
+    let is_mixed = runs.mixed.get(number as usize) == Some(&true);
+    if is_whole && met_parts >= if is_mixed { parts } else { parts.div_ceil(2) } {
         return Some(Bundle::of(small.into_iter().map(|(_, bundle)| bundle)));
     }
     links.extend(small);
@@ -291,19 +296,23 @@ mod tests {
     /// Rays that meet one side of a run, which has another side in the dark, lead to that side alone.
     #[test]
     fn a_run_of_which_less_than_half_is_seen_stands_for_nothing() {
-        let runs = Runs::new([512]);
-        let met = |places: u32| {
+        let mut runs = Runs::new([512]);
+        let met = |runs: &Runs, places: u32| {
             links(
                 (0..places)
                     .map(|i| Met { member: 0, place: 8 * i, toward: Vec3::X, share: 1e-3, apart: false })
                     .collect(),
-                &runs,
+                runs,
             )
         };
         let largest = |links: Vec<Link>| links.iter().map(|link| unpack(link.packed).0).max();
-        assert_eq!(largest(met(3)), Some(2));
-        assert_eq!(met(3).len(), 3);
+        assert_eq!(largest(met(&runs, 3)), Some(2));
+        assert_eq!(met(&runs, 3).len(), 3);
         // Four of eight clusters.
-        assert_eq!(largest(met(32)), Some(64 + 8));
+        assert_eq!(largest(met(&runs, 32)), Some(64 + 8));
+        // Of two sides, all or none.
+        runs.mixed = vec![true; 64 + 8 + 1];
+        assert_eq!(largest(met(&runs, 32)), Some(64 + 3));
+        assert_eq!(largest(met(&runs, 64)), Some(64 + 8));
     }
 }

@@ -2,7 +2,7 @@
 //! whole group.
 
 use super::cluster_order::cluster_order;
-use super::links::{Link, Met, Runs, links};
+use super::links::{Link, Met, RUNS, Runs, links};
 use super::own_visibility::{Counts, Eye, Front, PATTERN, Rays, Seen, Standing, Target, see};
 use super::packet::{BlockerTriangle, Blockers, Mask};
 use super::refine::{Limits, Refined, refine};
@@ -28,7 +28,7 @@ use std::sync::{Arc, OnceLock};
 use std::time::Instant;
 
 /// Counts in every name of the cache: another number where a bake of surfaces computes something else.
-const VERSION: u32 = 31;
+const VERSION: u32 = 32;
 /// How far towards the middle of its triangles a vertex is seen from, as a share of the way: the light of a crease is
 /// that just inside each face. Where meshes are left as they are, so are the places from which they are seen.
 const NUDGE: f32 = 0.02;
@@ -52,6 +52,10 @@ const LIT_SHARE: f64 = 0.125;
 pub(super) const BURIED_BACKS: f64 = 0.5;
 /// Share of it that is blocked there at least.
 pub(super) const BURIED_BLOCKED: f64 = 0.35;
+/// Vertices are of one side if their normals have such a cosine with the mean, and if they lie apart along it by no more
+/// than such a share of their extent.
+const LEAST_COMMON: f32 = 0.5;
+const MOST_HEIGHT: f32 = 0.35;
 /// Places on the way from a buried vertex to the middle of a triangle where one that is not may be.
 const WAYS_OUT: [f32; 5] = [0.06, 0.15, 0.3, 0.5, 0.8];
 /// The same on the way to the vertices beside it, where the middles of all its triangles are buried too.
@@ -337,7 +341,11 @@ impl GroupPlan {
             .into_par_iter()
             .map(|(surface, member, parents)| Lit::new(&member.mesh, &surface.mesh, parents.as_deref()))
             .collect();
-        let runs = Runs::new(lit.iter().map(|lit| lit.order.len()));
+        let mut runs = Runs::new(lit.iter().map(|lit| lit.order.len()));
+        let is_mixed = |(member, first, count): (usize, usize, usize)| {
+            is_mixed(&surfaces[member].mesh, &lit[member].order[first..first + count])
+        };
+        runs.mixed = runs.all().map(is_mixed).collect();
         let total: usize = receivers.iter().map(|&member| surfaces[member].mesh.positions.len()).sum();
         let mut done = 0;
         for &member in &receivers {
@@ -692,6 +700,19 @@ impl GroupSpace<'_> {
     }
 }
 
+/// Whether vertices are of different sides, as of both faces of a wall: their normals differ, or they lie apart along
+/// their common normal.
+fn is_mixed(mesh: &Mesh, vertices: &[u32]) -> bool {
+    let normals = || vertices.iter().map(|&v| mesh.normals[v as usize]);
+    let common = normals().sum::<Vec3>().normalize_or_zero();
+    let places = || vertices.iter().map(|&v| mesh.positions[v as usize]);
+    let low = places().fold(Vec3::INFINITY, Vec3::min);
+    let high = places().fold(Vec3::NEG_INFINITY, Vec3::max);
+    let heights = || places().map(|place| place.dot(common));
+    let height = heights().fold(f32::NEG_INFINITY, f32::max) - heights().fold(f32::INFINITY, f32::min);
+    height > MOST_HEIGHT * low.distance(high) || normals().any(|normal| normal.dot(common) < LEAST_COMMON)
+}
+
 /// The vertices that are lit on the triangles of a mesh.
 struct Lit {
     order: Vec<u32>,
@@ -707,6 +728,7 @@ impl Lit {
         let order = cluster_order(surface);
         let mut places = vec![0; order.len()];
         order.iter().zip(0..).for_each(|(&v, place)| places[v as usize] = place);
+        let mixed: Vec<bool> = order.chunks(RUNS[0]).map(|run| is_mixed(surface, run)).collect();
         let mut counts = vec![0_u32; mesh.triangles.len()];
         let parent = |part: usize| parents.map_or(part, |parents| parents[part] as usize);
         (0..surface.triangles.len()).for_each(|part| counts[parent(part)] += 1);
@@ -742,8 +764,11 @@ impl Lit {
                     if *cell == u32::MAX || is_within(corners, at) {
                         let place = at[0] * edges[0] + at[1] * edges[1];
                         let away = positions.map(|position| position.distance_squared(place));
-                        let nearest = (0..3).min_by(|&a, &b| away[a].total_cmp(&away[b])).unwrap_or(0);
-                        *cell = places[vertices[nearest] as usize];
+                        // The light of a run is the mean of its vertices.
+                        let is_mixed = |i: usize| mixed[places[vertices[i] as usize] as usize / RUNS[0]];
+                        let nearest =
+                            (0..3).min_by(|&a, &b| is_mixed(a).cmp(&is_mixed(b)).then(away[a].total_cmp(&away[b])));
+                        *cell = places[vertices[nearest.unwrap_or(0)] as usize];
                     }
                 }
             }

@@ -5,6 +5,7 @@ use super::common::{Gpu, generate, gpu, inside_out, joined, parse, part, relativ
 use super::stage::{against_rays, small};
 use glam::Vec3;
 use shadow_fields::asset::Mesh;
+use shadow_fields::asset::environment::EnvironmentData;
 use shadow_fields::bounce::Bounces;
 use shadow_fields::scene::data::EntityData;
 use shadow_fields::scene::{Lights, Motion, Scene, SceneBuilder};
@@ -261,6 +262,32 @@ fn light_bounces_through_a_door_and_not_through_walls() {
     let sides = mesh.triangles.iter().flat_map(|[a, b, c]| [[a, b], [b, c], [c, a]]);
     let long = sides.filter(|side| crosses(side.map(|v| mesh.positions[*v as usize]))).count();
     assert_eq!(long, 0, "triangles reach from one room into the other");
+}
+
+/// Nothing of the bright outside of a house comes in, though walls, floor and ceiling are one mesh with it: runs of
+/// neighbouring vertices may be of both sides.
+#[test]
+fn a_closed_house_of_one_mesh_is_dark_within() {
+    let Some(gpu) = gpu() else { return };
+    let within = inside_out(&generate::cuboid(Vec3::new(4.0, 2.6, 4.0), 1));
+    let house = joined(&[(&generate::cuboid(Vec3::new(4.6, 3.2, 4.6), 1), Vec3::ZERO), (&within, Vec3::ZERO)]);
+    let scene = Scene::builder()
+        .environment(EnvironmentData { uniform: Some(Vec3::ONE), ..Default::default() })
+        .mesh("house", house)
+        .entity(stands("house", 0.0, 0.0))
+        .build()
+        .unwrap();
+    let mut frame = frame_of_rooms(&gpu, &scene);
+    let light = gpu.light(&mut frame, &scene.at(0.0)).swap_remove(0);
+    let positions = &frame.scene().surface(0).positions;
+    let is_within = |at: &Vec3| at.abs().cmple(Vec3::new(2.01, 1.31, 2.01)).all();
+    let mean = |inner: bool| {
+        let shown = light.iter().zip(positions).filter(|(_, at)| is_within(at) == inner);
+        let shown: Vec<f32> = shown.map(|(rgb, _)| rgb[0]).collect();
+        shown.iter().sum::<f32>() / shown.len() as f32
+    };
+    let [within, outside] = [true, false].map(mean);
+    assert!(outside > 0.5 && within < 3e-3, "{within} within, {outside} outside");
 }
 
 /// A shade around a lamp is brighter by far than all else, and small: every vertex of the room finds it by rays that are

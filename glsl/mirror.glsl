@@ -27,10 +27,11 @@ vec2 within_part(vec2 place, vec2 ends, float level) {
 // A place, or the texel beside it of something that touches the mirror: through the gap under that, what lies beyond is
 // seen. `scale` makes a depth the share of the way that is behind the mirror.
 vec2 before_gap(vec2 place, vec2 ends, float scale) {
+    ivec2 first = ivec2(ends.x, 0), last = ivec2(ends.y, textureSize(mirror_far, 0).y) - 1;
     ivec2 texel = ivec2(place), nearest = texel;
     float least = texelFetch(mirror_far, texel, 0).x, most = least;
     for (int i = 0; i < 9; i++) {
-        ivec2 at = clamp(texel + ivec2(i % 3, i / 3) - 1, ivec2(ends.x, 0), ivec2(ends.y, textureSize(mirror_far, 0).y) - 1);
+        ivec2 at = clamp(texel + ivec2(i % 3, i / 3) - 1, first, last);
         float far = texelFetch(mirror_far, at, 0).x;
         nearest = far < least ? at : nearest;
         least = min(far, least);

@@ -9,7 +9,7 @@ use crate::asset::mesh::area_m2;
 use crate::asset::{Mesh, topology};
 
 /// Most solids that a primitive is cut into.
-const SOLIDS_LIMIT: usize = 64;
+const SOLIDS_LIMIT: usize = 256;
 /// Most triangles of a solid that is cut off. Such a convex one has a closed form; others are as well off together, and
 /// each would take a second to bake.
 const SOLID_TRIANGLES: usize = 64;

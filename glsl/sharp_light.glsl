@@ -214,6 +214,13 @@ bool blended_irradiance(Entity shining, out float irradiance) {
 }
 #endif
 
+#if HALVES
+// Whether a place is outside of an object's bounding sphere, with a ramp.
+float outside_ball(vec3 place) {
+    return clamp((length(place) - INSIDE_FROM) / (INSIDE_TO - INSIDE_FROM), 0.0, 1.0);
+}
+#endif
+
 // The share of each part of a block that an occluder lets through. With `before` only what lies before the light
 // counts; without it the occluder is the light itself, and its own outline counts.
 vec4 let_through(Entity occluder, Surface surface, SeenLight light, Block block, bool before) {
@@ -237,21 +244,32 @@ vec4 let_through(Entity occluder, Surface surface, SeenLight light, Block block,
         rays.foot[k] = rays.place - rays.offset[k] * rays.along[k];
         vec3 direction = rays.axes * rays.along[k];
         weights[k] = node_weights(cell, direction);
-        in_box[k] = through_box(field, place, direction);
+        in_box[k] = vec2(-NO_BOX, NO_BOX);
+#if BOXES
+        if (first < HAS_HALVES) {
+            in_box[k] = through_box(field, place, direction);
+        }
+#endif
         limit[k] = before ? reach_of(light, part, rays.along[k]) * occluder.centre.w : EVERYTHING;
         float sine = part_sine(light, block, part, rays.along[k]);
         tangent[k] = sine * inversesqrt(1.0 - sine * sine);
     }
-    vec4 inside = vec4(0.0);
+    vec4 inside = vec4(0.0), all = vec4(0.0);
+    bool behind = false; // whether the box lies behind the point
 #if HALVES
     // Within the bounding sphere each half of the object counts as far as its outline lies between the point and the
-    // light.
+    // light, unless all of its box does before a light outside, or its box lies behind the point.
     if (before && first >= HAS_HALVES) {
+        vec2 box = through_box(field, place, rays.axes * rays.middle);
+        behind = box[1] < TOUCHING;
+        float outside = outside_ball(rays.place);
         EACH for (uint k = 0; k < 4; k++) {
-            float nearest = min(length(rays.place), length(rays.place + limit[k] * rays.along[k]));
+            float end_outside = outside_ball(rays.place + limit[k] * rays.along[k]);
             float deep = max(rays.offset[k], -rays.offset[k] - limit[k]);
-            inside[k] = clamp((INSIDE_TO - nearest) / (INSIDE_TO - INSIDE_FROM), 0.0, 1.0)
-                      * clamp((deep - DEEP_FROM) / (DEEP_TO - DEEP_FROM), 0.0, 1.0);
+            vec2 ends = box_ends(box, limit[k]);
+            all[k] = ends.x * ends.y * end_outside;
+            inside[k] = (1.0 - min(outside, end_outside)) * clamp((deep - DEEP_FROM) / (DEEP_TO - DEEP_FROM), 0.0, 1.0);
+            inside[k] *= behind ? 0.0 : 1.0 - all[k];
         }
     }
 #endif
@@ -279,6 +297,7 @@ vec4 let_through(Entity occluder, Surface surface, SeenLight light, Block block,
         counts[side] = stands;
         side++;
     } while (side <= last);
+    counts[WHOLE] = behind ? vec4(0.0) : max(counts[WHOLE], all);
     vec4 blocked_by = share[WHOLE] * counts[WHOLE];
 #if HALVES
     if (last != WHOLE) {
@@ -458,8 +477,8 @@ vec3 chain_sum(Surface surface, uint i, uint end) {
     Entity shining = ENTITY(chain_light(entry_at(end)));
     SeenLight light = seen_light(shining.centre.xyz - surface.origin - surface.position, shining);
 #if OUTLINES && BOXES
-    if (shining.light_kind == LIGHT_OUTLINE) {
-        uint own = shining.silhouette & ~HAS_HALVES;
+    if (shining.light_kind == LIGHT_OUTLINE && shining.silhouette < HAS_HALVES) {
+        uint own = shining.silhouette;
         light.box[0] = node_quad(own).xyz / shining.centre.w;
         light.box[1] = node_quad(own + 1).xyz / shining.centre.w;
     }

@@ -145,13 +145,11 @@ vec2 outline(NearMap near, uint side, vec3 along, vec3 foot) {
     return vec2(distance, near.sign * between(cell.y, weights));
 }
 
+#if BOXES || HALVES
 // Where a ray enters the box around an object and where it leaves it. If it misses the box, the interval has no ends,
 // and the outline alone decides.
 vec2 through_box(uint field, vec3 point, vec3 direction) {
-#if BOXES
     vec2 ends = slabs(node_quad(field).xyz - point, node_quad(field + 1).xyz - point, direction);
     return ends.x > ends.y ? vec2(-NO_BOX, NO_BOX) : ends;
-#else
-    return vec2(-NO_BOX, NO_BOX);
-#endif
 }
+#endif

@@ -2,7 +2,7 @@
 // `low` and `high` are the box's corners from the ray's point, along its axes. The twin is in src/field/silhouette.rs.
 #ifndef SLABS
 #define SLABS
-#if BOXES || CUBOIDS
+#if BOXES || CUBOIDS || HALVES
 vec2 slabs(vec3 low, vec3 high, vec3 direction) {
     vec3 per_step = 1.0 / mix(direction, vec3(LEAST_STEP), lessThan(abs(direction), vec3(LEAST_STEP)));
     vec3 one = low * per_step, other = high * per_step;

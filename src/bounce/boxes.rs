@@ -104,6 +104,7 @@ pub fn hidden_row(permutation: &MergePermutation) -> ShaderPermutation {
         .number("NARROWED", NARROWED)
         .define("MOST_BOXES", MOST_SCREENS as u32)
         .define("BOXES", false)
+        .define("HALVES", false)
         .define("CUBOIDS", true)
         .outlines()
 }

@@ -113,6 +113,8 @@ pub struct Outline {
 #[derive(Clone, Copy, Debug)]
 pub struct Near {
     point: DVec3,
+    /// Their middle, a unit vector.
+    toward: DVec3,
     cell: Cell,
     maps: [NearMap; 4],
 }
@@ -283,7 +285,7 @@ impl SilhouetteField {
             near.depth = self.depth(&near, Side::Whole);
             near
         });
-        Near { point, cell, maps }
+        Near { point, toward, cell, maps }
     }
 
     /// Depth along the direction of the nearest point of a side's outline.
@@ -305,17 +307,17 @@ impl SilhouetteField {
         found
     }
 
-    /// Least and largest corner of the box around the object, in r: a boundless one where halves or the bounding sphere
-    /// tell as much.
+    /// Least and largest corner of the box around the object, in r: a boundless one where the bounding sphere tells as
+    /// much.
     pub fn extent(&self) -> [DVec3; 2] {
         let [low, high] = self.header.extent.map(|corner| DVec3::from_array(corner.map(f64::from)));
-        let tells = !self.has_halves() && low.max(-high).max_element() > -ROUND;
+        let tells = low.max(-high).max_element() > -ROUND;
         if tells { [low, high] } else { [DVec3::splat(-NO_BOX), DVec3::splat(NO_BOX)] }
     }
 
     /// Whether the box tells what neither the outline nor halves do.
     pub fn has_box(&self) -> bool {
-        self.extent()[1].x < NO_BOX
+        !self.has_halves() && self.extent()[1].x < NO_BOX
     }
 
     /// Where a ray enters and leaves the box around the object. If it misses the box, the interval has no ends, and the
@@ -329,7 +331,17 @@ impl SilhouetteField {
     /// radius.
     pub fn blocked(&self, near: &Near, direction: DVec3, distance: f64, tangent: f64) -> f64 {
         let along = near.point.dot(direction);
-        let in_box = self.through_box(near.point, direction);
+        let has_halves = self.has_halves();
+        let in_box = self.through_box(near.point, if has_halves { near.toward } else { direction });
+        if has_halves && in_box[1] < TOUCHING {
+            return 0.0;
+        }
+        let end = near.point + distance.min(1e30) * direction;
+        let outside = |place: DVec3| ((place.length() - INSIDE[0]) / (INSIDE[1] - INSIDE[0])).clamp(0.0, 1.0);
+        // Halves tell how much of the object stands between, unless all of its box does before a light outside.
+        let all = box_ends(in_box, distance).iter().product::<f64>() * outside(end);
+        let all = if has_halves { all } else { 0.0 };
+        let tells = if has_halves { [-NO_BOX, NO_BOX] } else { in_box };
         // Share that an outline blocks, and how far it counts.
         let by = |side: Side| {
             let outline = self.outline(near, side, direction);
@@ -340,14 +352,15 @@ impl SilhouetteField {
                 Side::Far => HALF_DEPTH,
                 Side::Near => -HALF_DEPTH,
             };
-            (share, counts_between(away, distance - deeper, in_box))
+            (share, counts_between(away, distance - deeper, tells))
         };
         let (whole, counts) = by(Side::Whole);
-        let nearest = near.point.length().min((near.point + distance.min(1e30) * direction).length());
+        let counts = f64::max(counts, all);
         let deep = along.max(-along - distance);
-        let inside = ((INSIDE[1] - nearest) / (INSIDE[1] - INSIDE[0])).clamp(0.0, 1.0)
-            * ((deep - DEEP[0]) / (DEEP[1] - DEEP[0])).clamp(0.0, 1.0);
-        if inside == 0.0 || !self.has_halves() {
+        let inside = (1.0 - outside(near.point).min(outside(end)))
+            * ((deep - DEEP[0]) / (DEEP[1] - DEEP[0])).clamp(0.0, 1.0)
+            * (1.0 - all);
+        if inside == 0.0 || !has_halves {
             return whole * counts;
         }
         let [(far, beyond), (near, before)] = [by(Side::Far), by(Side::Near)];
@@ -375,12 +388,18 @@ pub(super) fn slabs(corners: [DVec3; 2], point: DVec3, direction: DVec3) -> [f64
 /// stands where the ray passes its box: all of it, where the ray enters and leaves the box between receiver and limit,
 /// with a ramp where the box reaches beyond either.
 pub(super) fn counts_between(away: f64, limit: f64, [enters, leaves]: [f64; 2]) -> f64 {
-    let apart = leaves < TOUCHING || enters > limit - TOUCHING;
     let stands = away.max(enters).min(leaves);
-    let within = |beyond: f64| (1.0 - beyond / NEAREST).clamp(0.0, 1.0);
-    let begins = fade(stands).max(within(-enters));
-    let ends = fade(limit - stands).max(within(leaves - limit));
+    let [enters_between, leaves_between] = box_ends([enters, leaves], limit);
+    let begins = fade(stands).max(enters_between);
+    let ends = fade(limit - stands).max(leaves_between);
+    let apart = leaves < TOUCHING || enters > limit - TOUCHING;
     if apart { 0.0 } else { begins * ends }
+}
+
+/// How far the place where a ray enters a box lies beyond the receiver, and that where it leaves it before the limit: 1 or 0,
+/// with a ramp between.
+fn box_ends([enters, leaves]: [f64; 2], limit: f64) -> [f64; 2] {
+    [-enters, leaves - limit].map(|beyond| (1.0 - beyond / NEAREST).clamp(0.0, 1.0))
 }
 
 /// 1 where a length (in r) is positive and 0 where it is negative, with a ramp between that hides the depth's own

@@ -185,6 +185,13 @@ pub fn part(mesh: &Mesh, is_wanted: impl Fn(&[u32; 3]) -> bool) -> Mesh {
     Mesh::new("part", mesh.positions.clone(), mesh.normals.clone(), None, triangles).unwrap()
 }
 
+/// A mesh of quads, four corners each.
+pub fn of_quads(name: &str, corners: Vec<Vec3>) -> Mesh {
+    let quads = 0..corners.len() as u32 / 4;
+    let triangles = quads.flat_map(|i| [[4 * i, 4 * i + 1, 4 * i + 2], [4 * i, 4 * i + 2, 4 * i + 3]]).collect();
+    Mesh::new(name, corners, Vec::new(), None, triangles).unwrap()
+}
+
 /// A mesh's places and triangles as OBJ text.
 pub fn obj(mesh: &Mesh) -> String {
     let places = mesh.positions.iter().map(|p| format!("v {} {} {}\n", p.x, p.y, p.z));

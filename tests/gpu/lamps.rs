@@ -1,6 +1,6 @@
 //! Rooms that people build and their lamps: pictures beside rays.
 
-use crate::common::{Gpu, generate, gpu, inside_out, part, relative_rms};
+use crate::common::{Gpu, generate, gpu, inside_out, of_quads, part, relative_rms};
 use crate::stage::{shines, stands};
 use glam::{DQuat, Vec2, Vec3};
 use shadow_fields::asset::Mesh;
@@ -135,13 +135,6 @@ fn what_is_carried_together_shades_itself_as_at_rest() {
     assert!(error < 0.015, "{error}");
 }
 
-/// A mesh of quads, four corners each.
-fn of_quads(name: &str, corners: Vec<Vec3>) -> Mesh {
-    let quads = 0..corners.len() as u32 / 4;
-    let triangles = quads.flat_map(|i| [[4 * i, 4 * i + 1, 4 * i + 2], [4 * i, 4 * i + 2, 4 * i + 3]]).collect();
-    Mesh::new(name, corners, Vec::new(), None, triangles).unwrap()
-}
-
 /// A bulb that high within a shade, which is a profile (radius, height) turned around.
 fn under_a_shade(profile: &[[f32; 2]], height: f32) -> Scene {
     let sides = 24_u32;
@@ -205,6 +198,30 @@ fn a_window_casts_a_patch_of_sunlight_and_its_highlight() {
         let error = picture_error(&gpu, &scene.build().unwrap());
         assert!(error < 0.11, "{error}");
     }
+}
+
+/// A vault of one sheet ends in a wall that is higher: below the vault no sun comes in along the line where they meet
+/// (0.55).
+#[test]
+fn no_sunlight_comes_in_where_a_vault_meets_a_wall() {
+    let Some(gpu) = gpu() else { return };
+    let place = |i: u32, z: f32| {
+        let turn = std::f32::consts::PI * i as f32 / 24.0;
+        Vec3::new(1.5 * turn.cos(), 1.5 * turn.sin(), z)
+    };
+    let wall = [[-2.0, -1.0], [2.0, -1.0], [2.0, 3.0], [-2.0, 3.0]].map(|[x, y]| Vec3::new(x, y, 0.0));
+    let sheet = (0..24).flat_map(|i| [place(i, 4.0), place(i + 1, 4.0), place(i + 1, 0.0), place(i, 0.0)]);
+    let sky = r#"uniform = [0.02, 0.02, 0.02]
+sun = { toward = [0.5, 0.8, 0.3], angle_deg = 1, radiance = [3000, 3000, 3000] }"#;
+    let scene = Scene::builder()
+        .camera(Camera::new([0.0, 0.9, 1.6], [0.0, 1.2, 0.0]))
+        .environment(toml::from_str(sky).unwrap())
+        .mesh("vault", of_quads("vault", sheet.collect()))
+        .mesh("wall", of_quads("wall", wall.to_vec()))
+        .entity(EntityData::of_mesh("vault"))
+        .entity(EntityData::of_mesh("wall"));
+    let error = picture_error(&gpu, &scene.build().unwrap());
+    assert!(error < 0.15, "{error}");
 }
 
 /// A lamp in a thin box hangs right below a slab: nothing of its light gets above that.

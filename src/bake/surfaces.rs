@@ -28,7 +28,7 @@ use std::sync::{Arc, OnceLock};
 use std::time::Instant;
 
 /// Counts in every name of the cache: another number where a bake of surfaces computes something else.
-const VERSION: u32 = 32;
+const VERSION: u32 = 33;
 /// How far towards the middle of its triangles a vertex is seen from, as a share of the way: the light of a crease is
 /// that just inside each face. Where meshes are left as they are, so are the places from which they are seen.
 const NUDGE: f32 = 0.02;
@@ -42,6 +42,9 @@ const FAR: f64 = 0.65;
 /// or long member reaches far beyond the box, and a floor on which it stands touches that: sun patches on the floor
 /// of a house with windows err 0.187 by maps and 0.025 by outlines, the shadow of a bowl on a table 0.062 and 0.024.
 const WITHIN: f64 = 0.02;
+/// Of the vertices to which surfaces may grow one in so many is added at least, however many there were: a floor below a
+/// fine statue is lit at four of its own.
+const LEAST_ADDED: usize = 4;
 /// A lamp lights a member from close by that is so near its middle, in the member's bounding radii, is no larger than so
 /// many of the lamp's, and than this share of the group's.
 const LIT_CLOSE: f64 = 1.5;
@@ -324,7 +327,8 @@ impl GroupPlan {
             .clone()
             .map(|i| (Refined::new(&self.members[i].mesh), group.space(i), self.members[i].mesh.is_flat()))
             .collect();
-        if let Some(limits) = self.limits(&group).filter(|_| !refined.is_empty()) {
+        let start = refined.iter().map(|(refined, ..)| refined.positions.len()).sum();
+        if let Some(limits) = self.limits(&group, start).filter(|_| !refined.is_empty()) {
             let most = limits.vertices.max(1) as u32;
             refine(&mut refined, &limits, &|count| progress((count as u32).min(most) / 2, most));
         }
@@ -360,7 +364,8 @@ impl GroupPlan {
         (surfaces, report)
     }
 
-    fn limits(&self, group: &Group<'_>) -> Option<Limits> {
+    /// `start`: vertices of what is refined, as it came.
+    fn limits(&self, group: &Group<'_>, start: usize) -> Option<Limits> {
         let (vertices, moves) = self.refinement?;
         // What stands on a ground decides what is fine, not the ground.
         let solid: Vec<(DVec3, f64)> =
@@ -375,7 +380,7 @@ impl GroupPlan {
             .sum();
         let flat_edge = (0.02 * extent).max((4.0 * flat_area / f64::from(vertices)).sqrt() as f32);
         Some(Limits {
-            vertices: vertices as usize,
+            vertices: (vertices as usize).max(start + vertices as usize / LEAST_ADDED),
             flat_edge: if moves { flat_edge } else { 0.1 * extent.max(1.0) },
             edge: 0.1 * extent,
             least_edge: 0.004 * extent,

@@ -43,8 +43,9 @@ float box_blocks(Box box, vec3 along, float tangent, float limit, out float near
     vec3 near = half_width - abs(off), far = half_width + abs(off);
     vec3 share;
     EACH for (uint i = 0; i < 3; i++) {
-        float inside = share_blocked(near[i], near_away[i], tangent) + share_blocked(far[i], far_away[i], tangent) - 1.0;
-        share[i] = parallel[i] ? 1.0 : max(inside, 0.0);
+        float from_near = share_blocked(near[i], near_away[i], NEAREST_EDGE, tangent);
+        float from_far = share_blocked(far[i], far_away[i], NEAREST_EDGE, tangent);
+        share[i] = parallel[i] ? 1.0 : max(from_near + from_far - 1.0, 0.0);
     }
     vec3 turned = mix(side * cosines * inverse, vec3(0.0), parallel);
     vec3 two = mix(share * share.yzx, min(share, share.yzx), max(-turned * turned.yzx, 0.0));

@@ -7,9 +7,9 @@ float fade(float l) {
     return clamp(l / NEAREST + 0.5, 0.0, 1.0);
 }
 
-// Share of a small round light that an outline blocks which lies that far away, in r.
-float share_blocked(float distance, float away, float tangent) {
-    return blocked_share(distance / max(max(away, NEAREST) * tangent, LEAST_PENUMBRA));
+// Share of a small round light that an outline blocks which lies that far away and at least `nearest`, in r.
+float share_blocked(float distance, float away, float nearest, float tangent) {
+    return blocked_share(distance / max(max(away, nearest) * tangent, LEAST_PENUMBRA));
 }
 
 #if BOXES || CUBOIDS || HALVES

@@ -20,7 +20,7 @@ vec4 past_cuboid(Entity occluder, Surface surface, SeenLight light, Block block)
         float nearest, away;
         free[k] = 1.0 - occluder.opacity * box_blocks(box, along, tangent, limit, nearest, away);
 #if EDGES
-        float penumbra = max(away, NEAREST) * max(tangent, LEAST_PENUMBRA);
+        float penumbra = max(away, NEAREST_EDGE) * max(tangent, LEAST_PENUMBRA);
         find_edge(nearest, away, limit, penumbra, inversesqrt(block.area), surface.step * occluder.centre.w);
 #endif
     }

@@ -283,7 +283,7 @@ vec4 let_through(Entity occluder, Surface surface, SeenLight light, Block block,
         vec4 distance, away, blocks, stands;
         outlines(rays, cell, weights, side, distance, away);
         EACH for (uint k = 0; k < 4; k++) {
-            blocks[k] = share_blocked(distance[k], away[k], tangent[k]);
+            blocks[k] = share_blocked(distance[k], away[k], NEAREST, tangent[k]);
             float deeper = side == WHOLE ? 0.0 : side == FAR ? HALF_DEPTH : -HALF_DEPTH;
             stands[k] = counts_between(away[k], limit[k] - deeper, in_box[k]);
 #if EDGES

@@ -2,7 +2,7 @@
 //! text that is generated from the tables of [`crate::sh`].
 
 use crate::error::{Error, Result};
-use crate::field::cuboid::PARALLEL;
+use crate::field::cuboid::{NEAREST_EDGE, PARALLEL};
 use crate::field::quantity::channel_stride;
 use crate::field::self_visibility;
 use crate::field::silhouette::{LEAST_PENUMBRA, LEAST_STEP, NEAREST, NO_BOX, TOUCHING};
@@ -55,6 +55,7 @@ impl ShaderPermutation {
     /// Adds the macros of `outline.glsl` and `cuboid.glsl`.
     pub fn outlines(self) -> Self {
         self.number("NEAREST", NEAREST)
+            .number("NEAREST_EDGE", NEAREST_EDGE)
             .number("PARALLEL", PARALLEL)
             .number("NO_BOX", NO_BOX)
             .number("TOUCHING", TOUCHING)

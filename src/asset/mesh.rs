@@ -2,9 +2,9 @@
 
 use glam::{DVec3, Vec2, Vec3};
 
-use super::{enclose, outline, topology};
+use super::{boxes, enclose, outline, topology};
 use crate::error::{Error, Result};
-use crate::field::cuboid::Cuboid;
+use crate::field::cuboid::{Cuboid, PlacedCuboid};
 use crate::field::sheet::Rectangle;
 use crate::field::sub_light::{LampFace, TUBE};
 
@@ -44,6 +44,7 @@ pub struct Mesh {
     panel: Option<LampFace>,
     rectangle: Option<Rectangle>,
     cuboid: Option<Cuboid>,
+    boxes: Vec<PlacedCuboid>,
     two_sided: bool,
 }
 
@@ -157,10 +158,12 @@ impl Mesh {
             panel: None,
             rectangle: None,
             cuboid: None,
+            boxes: Vec::new(),
             two_sided: false,
         };
         mesh.rectangle = outline::rectangle(&mesh);
         mesh.cuboid = outline::cuboid(&mesh);
+        mesh.boxes = boxes::boxes(&mesh);
         if mesh.colors.is_none() {
             mesh.panel = mesh.rectangle.map_or_else(|| mesh.tube(), |rectangle| rectangle.as_lamp());
         }
@@ -328,11 +331,12 @@ impl Mesh {
         self.two_sided
     }
 
-    /// The mesh as one that has holes: neither closed nor a rectangle or a box.
+    /// The mesh as one that has holes: neither closed nor a rectangle or of boxes.
     pub(super) fn opened(mut self) -> Self {
         self.shape = topology::Topology { closed: false, solid: false, convex: false, ..self.shape };
         self.rectangle = None;
         self.cuboid = None;
+        self.boxes.clear();
         self.panel = None;
         self
     }
@@ -349,6 +353,11 @@ impl Mesh {
     /// The box that the mesh is, if it is one.
     pub fn cuboid(&self) -> Option<Cuboid> {
         self.cuboid
+    }
+
+    /// Boxes that overlap and together are the mesh, if it is a solid with square corners and no box itself.
+    pub fn boxes(&self) -> &[PlacedCuboid] {
+        &self.boxes
     }
 
     pub(super) fn with_panel(self, panel: LampFace) -> Self {

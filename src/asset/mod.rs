@@ -9,6 +9,7 @@ use std::path::Path;
 use crate::error::{Error, Result};
 pub use crate::text::short;
 
+mod boxes;
 pub mod decode;
 pub mod disc;
 pub mod edges;

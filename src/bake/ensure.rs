@@ -160,7 +160,12 @@ pub fn needs(scene: &Scene, mesh: usize, lights: Lights, groups: &Groups) -> Nee
     Needed {
         fields: [blocked.then_some(FieldKind::Occlusion), radiance.then_some(FieldKind::Radiance)],
         lamp_colors: seen().any(|e| scene.entities[e].emits && method(e).has_colors(&scene.meshes[mesh])),
-        silhouette: (casts && sharp && seen().any(|e| scene.entities[e].occludes && !scene.casts_as_box(e)))
+        silhouette: (casts
+            && sharp
+            && seen().any(|e| {
+                let by_boxes = scene.casts_as_box(e) || scene.casts_as_boxes(e);
+                scene.entities[e].occludes && !by_boxes
+            }))
             || shines(LightMethod::Outline),
     }
 }

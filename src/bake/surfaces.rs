@@ -28,7 +28,7 @@ use std::sync::{Arc, OnceLock};
 use std::time::Instant;
 
 /// Counts in every name of the cache: another number where a bake of surfaces computes something else.
-const VERSION: u32 = 33;
+const VERSION: u32 = 34;
 /// How far towards the middle of its triangles a vertex is seen from, as a share of the way: the light of a crease is
 /// that just inside each face. Where meshes are left as they are, so are the places from which they are seen.
 const NUDGE: f32 = 0.02;
@@ -74,6 +74,8 @@ pub struct Member {
     pub transparent: bool,
     /// The texture that makes holes in it.
     pub mask: Option<Arc<Texture>>,
+    /// Whether it blocks sharp lights as its boxes, which stand on lists: no map has its shadows.
+    pub boxed: bool,
     /// Members that shine block the view of the sky alone: before sharp lights they stand on lists.
     pub emits: bool,
     pub receives: bool,
@@ -147,19 +149,28 @@ impl SurfacePlan {
             let refines = refinement.is_some() && of.receives && scene.is_at_rest(entity) && !generated;
             let transparent = of.transparent;
             let occludes = of.occludes && !transparent;
-            let mask = scene.mask(entity).cloned();
-            Member { mesh, placement, occludes, transparent, mask, emits: of.emits, receives: of.receives, refines }
+            Member {
+                mesh,
+                placement,
+                occludes,
+                transparent,
+                mask: scene.mask(entity).cloned(),
+                boxed: scene.casts_as_boxes(entity),
+                emits: of.emits,
+                receives: of.receives,
+                refines,
+            }
         };
         let screens: Vec<_> = scene.screens().into_iter().map(|entity| scene.reach(entity)).collect();
         let mut plans: Vec<GroupPlan> = Vec::new();
         // The plans of entities alone: those with equal meshes share what is baked.
-        let mut alone: HashMap<([u8; 32], [bool; 3], Option<*const Texture>), usize> = HashMap::new();
+        let mut alone: HashMap<([u8; 32], [bool; 4], Option<*const Texture>), usize> = HashMap::new();
         for entities in groups.members() {
             let members: Vec<Member> = if let [only] = entities[..] {
                 // What an entity blocks of its own view does not depend on its place.
                 let member = Member { emits: false, ..member(only, AT_ORIGIN) };
                 let member = Member { occludes: !member.transparent, ..member };
-                let kind = [member.receives, member.refines, member.transparent];
+                let kind = [member.receives, member.refines, member.transparent, member.boxed];
                 let plan = alone.entry((member.mesh.content_hash(), kind, member.mask.as_ref().map(Arc::as_ptr)));
                 if let Entry::Occupied(known) = &plan {
                     plans[*known.get()].entities.push(only);
@@ -208,6 +219,7 @@ impl GroupPlan {
             occludes: true,
             transparent: false,
             mask: None,
+            boxed: false,
             emits: false,
             receives: true,
             refines: false,
@@ -257,7 +269,7 @@ impl GroupPlan {
                 format!("{:?}", (member.placement, member.occludes, member.emits, member.receives, member.refines))
                     .as_bytes(),
             );
-            hasher.update(&[u8::from(member.transparent)]);
+            hasher.update(&[member.transparent, member.boxed].map(u8::from));
             if let Some((mask, texels)) = member.mask.as_ref().and_then(|mask| Some((mask, mask.texels.as_ref()?))) {
                 hasher.update(format!("{:?}", (mask.wrap, mask.alpha_cutoff, texels.width)).as_bytes());
                 hasher.update(texels.rgba.as_flattened());
@@ -580,8 +592,8 @@ impl GroupSpace<'_> {
             let (middle, reach) = group.spheres[*member];
             let of = &group.plan.members[*member];
             // Outlines of these hold at every distance.
-            let keeps_outline =
-                of.emits || (of.mask.is_none() && (of.mesh.rectangle().is_some() || of.mesh.is_convex()));
+            let has_closed_form = of.boxed || of.mesh.rectangle().is_some() || of.mesh.is_convex();
+            let keeps_outline = of.emits || (of.mask.is_none() && has_closed_form);
             let [low, high] = group.boxes[*member];
             let is_within = |place: &DVec3| {
                 let local = of.placement.local(group.centre + group.radius_m * *place);
@@ -592,7 +604,7 @@ impl GroupSpace<'_> {
             let is_close =
                 |place: &DVec3| place.distance(middle) < FAR * reach && (of.mask.is_some() || is_within(place));
             let comes_near = || places.iter().any(is_close);
-            *member == self.member || (of.occludes && !keeps_outline && comes_near())
+            (*member == self.member && !of.boxed) || (of.occludes && !keeps_outline && comes_near())
         };
         (0..group.spheres.len()).filter(is_near).map(|member| member as u32).collect()
     }
@@ -618,6 +630,7 @@ impl GroupSpace<'_> {
         let mut maps = vec![0; if has_maps { mesh.positions.len() * BYTES } else { 0 }];
         let mut near = Vec::with_capacity(order.len().div_ceil(CLUSTER_VERTICES as usize));
         let mut any_blocked = false;
+        let mut any_in_map = false;
         let mut linked = Links::default();
         let clusters: Vec<&[u32]> = order.chunks(CLUSTER_VERTICES as usize).collect();
         let mut done = 0;
@@ -690,6 +703,7 @@ impl GroupSpace<'_> {
                         maps[v as usize * BYTES..][..BYTES].copy_from_slice(&seen.map);
                     }
                 }
+                any_in_map |= members.iter().any(|member| self.blocks[*member as usize]);
                 near.push(members);
                 done += cluster.len();
             }
@@ -698,7 +712,7 @@ impl GroupSpace<'_> {
         BakedSurface {
             mesh,
             transfer: (any_blocked && wanted.transfer).then(|| Arc::new(transfer)),
-            self_visibility: (any_blocked && has_maps).then(|| Arc::new(maps)),
+            self_visibility: (any_blocked && any_in_map && has_maps).then(|| Arc::new(maps)),
             near,
             links: (!linked.packed.is_empty()).then(|| Arc::new(linked)),
         }

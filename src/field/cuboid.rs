@@ -6,18 +6,30 @@
 //! bounding radii of the box, as those of silhouette fields ([`super::silhouette`]) are, and so is the rule of what lies
 //! between a point and a light.
 
-use super::silhouette::{LEAST_PENUMBRA, NEAREST, NO_BOX, blocked_share, counts_between, through_box};
+use super::silhouette::{LEAST_PENUMBRA, NO_BOX, blocked_share, counts_between, through_box};
 use glam::DVec3;
 
 /// Square of the sine of the angle between a ray and edges within which the ray counts as parallel to them: what the
 /// strip cuts off the other two is no more than that sine.
 pub const PARALLEL: f64 = 1e-6;
 
+/// Least distance of an edge from a receiver that a penumbra is computed for, in r. Edges are exact, so that it is less
+/// than that of maps: on a wall of several boxes the next one begins in the wall's plane.
+pub const NEAREST_EDGE: f64 = 1e-4;
+
 /// A box about the centre of its bounding sphere, in the frame of a mesh.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Cuboid {
     /// Halves of three edges, at right angles to each other, in r.
     pub half_edges: [DVec3; 3],
+}
+
+/// A box in the frame of a mesh, where it is part of a solid.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PlacedCuboid {
+    pub centre_m: DVec3,
+    pub radius_m: f64,
+    pub cuboid: Cuboid,
 }
 
 /// A ray beside a box.
@@ -95,7 +107,7 @@ impl Cuboid {
         let ray = self.ray(point, along);
         let strip = |i: usize| {
             let [near, far] = [0, 1].map(|side| {
-                let width = (ray.away[i][side].max(NEAREST) * tangent).max(LEAST_PENUMBRA);
+                let width = (ray.away[i][side].max(NEAREST_EDGE) * tangent).max(LEAST_PENUMBRA);
                 blocked_share(ray.distances[i][side] / width)
             });
             (near + far - 1.0).max(0.0)

@@ -396,8 +396,8 @@ pub(super) fn counts_between(away: f64, limit: f64, [enters, leaves]: [f64; 2]) 
     if apart { 0.0 } else { begins * ends }
 }
 
-/// How far the place where a ray enters a box lies beyond the receiver, and that where it leaves it before the limit: 1 or 0,
-/// with a ramp between.
+/// How far the place where a ray enters a box lies beyond the receiver, and that where it leaves it before the limit: 1 or
+/// 0, with a ramp between.
 fn box_ends([enters, leaves]: [f64; 2], limit: f64) -> [f64; 2] {
     [-enters, leaves - limit].map(|beyond| (1.0 - beyond / NEAREST).clamp(0.0, 1.0))
 }

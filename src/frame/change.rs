@@ -23,6 +23,7 @@ impl Frame {
         let look = |entity: &Entity| (entity.gloss.is_some(), entity.maps);
         let same_looks = scene.entities.iter().map(look).eq(self.scene.entities.iter().map(look));
         same_looks
+            && self.scene.is_boxed_like(scene)
             && self.groups == groups
             && self.surfaces.keys() == surfaces.keys()
             && self.buffers.cover_fields(scene, self.options.lights, &groups)
@@ -48,7 +49,7 @@ impl Frame {
         // A shader that knows of lights serves a scene without them as well.
         if harmonic_lights(scene, &self.methods) && !self.merge.permutation.lights {
             let wanted = MergePermutation { lights: true, ..self.merge.permutation };
-            let usable = usable(&self.device, &self.buffers, scene.entities.len(), wanted);
+            let usable = usable(&self.device, &self.buffers, scene.entities.len() + self.boxes.len(), wanted);
             self.merge = Merge::new(&self.device, &self.library, usable)?;
             self.forget();
         }

@@ -80,6 +80,8 @@ pub struct Frame {
     /// What the own visibility of the vertices was baked for.
     surfaces: SurfacePlan,
     methods: Vec<LightMethod>,
+    /// Boxes as which entities block sharp lights, behind the entities on all lists: entity, and number of its box.
+    boxes: Vec<[usize; 2]>,
     options: Options,
     /// Baked and uploaded data.
     pub buffers: SceneBuffers,
@@ -121,7 +123,8 @@ impl Frame {
         scene.surfaces = baked.surface_of.iter().map(|&surface| baked.surfaces[surface].mesh.clone()).collect();
         let buffers = SceneBuffers::new(device, &scene, &options.bake, baked)?;
         log::debug!("it is on the device");
-        let entity_count = scene.entities.len();
+        let boxes = scene.boxes();
+        let entity_count = scene.entities.len() + boxes.len();
         let wanted = options.variant.unwrap_or_else(|| calibrate::best_known(device));
         let methods = methods(&scene, options.lights);
         let mut radiosity = RadiosityBuffers::new(device, &scene, &buffers)?;
@@ -218,6 +221,7 @@ impl Frame {
             groups: needs.groups,
             surfaces: needs.surfaces,
             methods,
+            boxes,
             sharp: sharp?,
             options,
             merge: merge?,

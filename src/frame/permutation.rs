@@ -55,7 +55,7 @@ pub(super) fn sharp(
         halves: any_field(SilhouetteField::has_halves),
         boxes: any_field(SilhouetteField::has_box),
         sheets: merge.sheets,
-        cuboids: (0..scene.entities.len()).any(|entity| scene.casts_as_box(entity)),
+        cuboids: (0..scene.entities.len()).any(|entity| scene.casts_as_box(entity) || scene.casts_as_boxes(entity)),
         globes: (0..scene.entities.len()).any(|entity| scene.is_globe(entity)),
         gloss: merge.gloss,
         self_shadows: buffers.has_self_shadows(),

@@ -46,9 +46,10 @@ impl PixelChains {
             receivers.push(lit.then_some((by_pixel, surface.reach_m)));
             clusters += if lit { (surface.vertices.len() as u32).div_ceil(CLUSTER_VERTICES) } else { 0 };
         }
+        let entity_count = scene.entities.len() + scene.boxes().len();
         let upload = |name: &str, bytes: usize| Upload::new(device, name, bytes as u64);
         Ok(PixelChains {
-            entities: upload("pixel entities", scene.entities.len() * size_of::<layout::DeviceEntity>())?,
+            entities: upload("pixel entities", entity_count * size_of::<layout::DeviceEntity>())?,
             entries: upload("pixel entries", 16)?,
             chains: upload("pixel chains", 8 * clusters.max(1) as usize)?,
             receivers,

@@ -1,13 +1,13 @@
 //! What an entity is to the merge at one time: its place, rotation and light; and the clusters of a receiver.
 
 use super::Frame;
-use crate::field::cuboid::Cuboid;
+use crate::field::cuboid::{Cuboid, PlacedCuboid};
 use crate::field::quantity::channel_stride;
 use crate::field::sheet::{Rectangle, Sheet};
 use crate::field::sub_light::LampFace;
 use crate::field::{Area, Fit, self_visibility};
 use crate::layout::{self, CLUSTER_VERTICES, NONE};
-use crate::lists::gather::{ClusterBounds, EntityBounds, Globe, OutlineShape, OutlineView, SceneBounds};
+use crate::lists::gather::{ClusterBounds, EntityBounds, Globe, Occludes, OutlineShape, OutlineView, SceneBounds};
 use crate::lists::incremental::{Member, State};
 use crate::lists::sight::TriangleRun;
 use crate::scene::{LightMethod, Placement};
@@ -19,13 +19,18 @@ use std::f64::consts::PI;
 impl Frame {
     /// All that lists and merge depend on at this time.
     pub(super) fn state(&self, placements: &[Placement]) -> State {
+        let of_entities = || placements.iter().enumerate();
+        let of_boxes = || self.boxes.iter().map(|[entity, number]| (*entity, *number, &placements[*entity]));
+        let bounds = of_entities().map(|(index, p)| self.entity_bounds(index, p));
         let bounds: Vec<EntityBounds> =
-            placements.iter().enumerate().map(|(index, p)| self.entity_bounds(index, p)).collect();
+            bounds.chain(of_boxes().map(|(entity, number, p)| self.box_bounds(entity, number, p))).collect();
+        let entities = of_entities().map(|(index, p)| self.entity(index, p));
+        let entities = entities.chain(of_boxes().map(|(entity, number, p)| self.box_entity(entity, number, p)));
         let white = f64::from(self.scene.data.output.white());
         let sky = (!self.scene.environment.is_none()).then_some(self.sky.brightest);
         let eps = f64::from(self.options.eps) * white;
         State {
-            entities: placements.iter().enumerate().map(|(index, p)| self.entity(index, p)).collect(),
+            entities: entities.collect(),
             scene_bounds: SceneBounds {
                 outlines: self.outlines_at(placements),
                 globes: self.globes_at(placements),
@@ -37,18 +42,24 @@ impl Frame {
         }
     }
 
-    /// Outlines of all entities, if any light is sharp.
+    /// Outlines of all entities and their boxes, if any light is sharp.
     fn outlines_at(&self, placements: &[Placement]) -> Vec<Option<OutlineView>> {
         let outline = |(index, placement): (usize, &Placement)| {
             let entity = &self.scene.entities[index];
             let shape = match (self.cuboid(index), &self.buffers.meshes[entity.mesh].slots.silhouette) {
                 (Some(slot), _) => OutlineShape::Cuboid(slot.content),
-                (_, Some(slot)) if entity.occludes => OutlineShape::Maps(slot.content.clone()),
+                (_, Some(slot)) if entity.occludes && !self.scene.casts_as_boxes(index) => {
+                    OutlineShape::Maps(slot.content.clone())
+                }
                 _ => return None,
             };
             Some(OutlineView { shape, to_object: placement.turn().inverse(), opaque: entity.opacity >= 1.0 })
         };
-        let all = || placements.iter().enumerate().map(outline).collect();
+        let of_box = |[entity, number]: &[usize; 2]| {
+            let shape = OutlineShape::Cuboid(self.box_slot(*entity, *number).content.cuboid);
+            Some(OutlineView { shape, to_object: placements[*entity].turn().inverse(), opaque: true })
+        };
+        let all = || placements.iter().enumerate().map(outline).chain(self.boxes.iter().map(of_box)).collect();
         self.sharp.as_ref().map_or(Vec::new(), |_| all())
     }
 
@@ -87,15 +98,20 @@ impl Frame {
             Some(slot) if sharp => slot.content.brightest,
             _ => device_mesh.radiance.as_ref().filter(|_| coloured).map_or(1.0, |s| s.header.radiance_scale.into()),
         };
+        let blocks_soft = holds(&device_mesh.blocked) || device_mesh.rectangle.is_some();
+        let blocks_sharp = device_mesh.slots.silhouette.is_some()
+            || device_mesh.rectangle.is_some()
+            || (self.sharp.is_some() && self.cuboid(index).is_some());
+        let occludes = match entity.occludes {
+            true if self.scene.casts_as_boxes(index) && blocks_soft => Occludes::Soft,
+            true if !self.scene.casts_as_boxes(index) && (blocks_soft || blocks_sharp) => Occludes::All,
+            _ => Occludes::Nothing,
+        };
         EntityBounds {
             centre: self.centre(index, placement),
             radius_m: self.radius_m(index, placement),
             reflectance: entity.reflection().map_or(f64::from(entity.albedo.max_element()), |_| 1.0),
-            occludes: entity.occludes
-                && (holds(&device_mesh.blocked)
-                    || device_mesh.slots.silhouette.is_some()
-                    || device_mesh.rectangle.is_some()
-                    || (self.sharp.is_some() && self.cuboid(index).is_some())),
+            occludes,
             emits: entity.emits && (sharp || holds(source)),
             sharp,
             coloured,
@@ -168,6 +184,43 @@ impl Frame {
         }
     }
 
+    pub(super) fn box_slot(&self, entity: usize, number: usize) -> Slot<PlacedCuboid> {
+        self.buffers.meshes[self.scene.entities[entity].mesh].slots.boxes[number]
+    }
+
+    fn box_bounds(&self, entity: usize, number: usize, placement: &Placement) -> EntityBounds {
+        let PlacedCuboid { centre_m, radius_m, .. } = self.box_slot(entity, number).content;
+        let stands = self.sharp.is_some() && self.scene.casts_as_boxes(entity);
+        EntityBounds {
+            centre: placement.point(centre_m),
+            radius_m: radius_m * f64::from(placement.scale),
+            reflectance: 0.0,
+            occludes: if stands { Occludes::Sharp } else { Occludes::Nothing },
+            emits: false,
+            sharp: false,
+            coloured: false,
+            sheet: None,
+            radiance: 0.0,
+            facing: None,
+        }
+    }
+
+    fn box_entity(&self, entity: usize, number: usize, placement: &Placement) -> layout::DeviceEntity {
+        let Slot { first_quad, content: PlacedCuboid { centre_m, radius_m, .. } } = self.box_slot(entity, number);
+        let [cos_a, sin_a, cos_b, sin_b, cos_c, sin_c] = turns(placement.turn()).map(|x| x as f32);
+        let inverse_radius = (1.0 / (radius_m * f64::from(placement.scale))) as f32;
+        layout::DeviceEntity {
+            centre: placement.point(centre_m).as_vec3().extend(inverse_radius).to_array(),
+            alpha_beta: [cos_a, sin_a, cos_b, sin_b],
+            gamma: [cos_c, sin_c],
+            opacity: 1.0,
+            scale: placement.scale,
+            silhouette: first_quad,
+            irradiance_first: NONE,
+            ..layout::DeviceEntity::default()
+        }
+    }
+
     /// Radius of an entity's bounding sphere in the world, metres.
     pub(super) fn radius_m(&self, index: usize, placement: &Placement) -> f64 {
         self.buffers.meshes[self.scene.entities[index].mesh].radius_m * f64::from(placement.scale)
@@ -183,9 +236,9 @@ impl Frame {
         self.methods[index]
     }
 
-    /// Whether an entity occludes and something sees it.
-    fn occludes(&self, index: usize) -> bool {
-        let entity = &self.scene.entities[index];
+    /// Whether an entity, or a box of one, occludes and something sees it.
+    fn may_occlude(&self, index: usize) -> bool {
+        let Some(entity) = self.scene.entities.get(index) else { return true };
         let device_mesh = &self.buffers.meshes[entity.mesh];
         let blocks = device_mesh.rectangle.is_some() || device_mesh.blocked.is_some();
         entity.occludes && (blocks || device_mesh.slots.silhouette.is_some() || self.cuboid(index).is_some())
@@ -206,10 +259,10 @@ impl Frame {
         Some(Sheet { centre: self.centre(index, placement), rectangle })
     }
 
-    /// Occluders of a receiver in their order, [`SceneBounds::order`]; itself left out.
+    /// Occluders of a receiver, entities and their boxes, in their order, [`SceneBounds::order`]; itself left out.
     pub(super) fn occluders(&self, scene_bounds: &SceneBounds, receiver: usize) -> Vec<usize> {
         let mut order: Vec<usize> =
-            (0..scene_bounds.spheres.len()).filter(|&j| self.occludes(j) && j != receiver).collect();
+            (0..scene_bounds.spheres.len()).filter(|&j| self.may_occlude(j) && j != receiver).collect();
         order.sort_by_cached_key(|&j| scene_bounds.order(receiver as u32, j as u32));
         order
     }

@@ -3,6 +3,7 @@
 use super::Frame;
 use crate::bounce::twin::{TwinInput, TwinVertex};
 use crate::error::Result;
+use crate::field::cuboid::PlacedCuboid;
 use crate::field::{Area, ShadowField, self_visibility};
 use crate::gpu::Buffer;
 use crate::layout::{CLUSTER_VERTICES, Cluster, ENTRY_ENTITIES, ListEntry};
@@ -19,9 +20,11 @@ use std::collections::{BTreeSet, HashSet};
 use std::f64::consts::PI;
 
 impl Frame {
-    /// Entities that stand on the list of any cluster of a receiver at this time.
+    /// Entities that stand on the list of any cluster of a receiver at this time, also by their boxes.
     pub fn listed(&self, placements: &[Placement], receiver: usize) -> BTreeSet<usize> {
-        self.work.lists.entities_on(&self.state(placements), receiver)
+        let listed = self.work.lists.entities_on(&self.state(placements), receiver);
+        let of_box = |j: usize| j.checked_sub(placements.len()).map_or(j, |i| self.boxes[i][0]);
+        listed.into_iter().map(of_box).collect()
     }
 
     /// The CPU twin of the merge in f64: radiosity of every receiver's vertices, by entity. Reads the fields back.
@@ -135,11 +138,15 @@ impl FrameTwin<'_> {
     pub fn run(&self) -> Vec<(usize, Vec<[f64; 3]>)> {
         let Frame { scene, options, .. } = self.frame;
         let objects = self.objects();
-        let outlines: Vec<SharpObject<'_>> = objects.iter().enumerate().map(|o| self.outline(o)).collect();
+        let outlines = objects.iter().enumerate().map(|o| self.outline(o));
+        let outlines: Vec<SharpObject<'_>> = outlines
+            .chain(self.frame.boxes.iter().map(|[entity, number]| self.box_outline(*entity, *number)))
+            .collect();
         let lit = |receiver: &Receiver| {
             let leaves = |v: usize, j: usize, light: Option<usize>| {
                 let (cluster_of, listed) = &receiver.clusters;
-                let is_own = self.frame.groups.is_own(receiver.index, j)
+                let is_own = j < objects.len()
+                    && self.frame.groups.is_own(receiver.index, j)
                     && light.is_none_or(|l| {
                         let is_sharp = self.frame.light_method(l).is_sharp() && l != j;
                         is_sharp && receiver.near[cluster_of[v]].binary_search(&(j as u32)).is_ok()
@@ -150,7 +157,8 @@ impl FrameTwin<'_> {
                 let Some(listed) = listed else { return false };
                 !listed[cluster_of[v]].contains(&(j as u32, light.map_or(ENTRY_ENTITIES, |l| l as u32)))
             };
-            let with_field = |j: &usize| objects[*j].blocked.is_some() || objects[*j].sheet.is_some();
+            let with_field =
+                |j: &usize| objects.get(*j).is_some_and(|object| object.blocked.is_some() || object.sheet.is_some());
             let occluders: Vec<usize> = receiver.occluders.iter().copied().filter(with_field).collect();
             let twin = MergeTwin {
                 objects: &objects,
@@ -181,14 +189,30 @@ impl FrameTwin<'_> {
     /// An object as the pass of sharp lights sees it.
     fn outline<'o>(&'o self, (index, object): (usize, &MergeObject<'o>)) -> SharpObject<'o> {
         let device_mesh = &self.frame.buffers.meshes[self.frame.scene.entities[index].mesh];
+        let by_boxes = self.frame.scene.casts_as_boxes(index);
         SharpObject {
             centre: object.centre,
             rotation: object.rotation,
             radius_m: object.radius_m,
-            silhouette: device_mesh.slots.silhouette.as_ref().map(|slot| &*slot.content),
+            silhouette: device_mesh.slots.silhouette.as_ref().filter(|_| !by_boxes).map(|slot| &*slot.content),
             cuboid: self.frame.cuboid(index).map(|slot| slot.content),
             sheet: object.sheet,
             opacity: object.opacity,
+        }
+    }
+
+    /// A box of an entity as that pass sees it.
+    fn box_outline(&self, entity: usize, number: usize) -> SharpObject<'_> {
+        let placement = &self.placements[entity];
+        let PlacedCuboid { centre_m, radius_m, cuboid } = self.frame.box_slot(entity, number).content;
+        SharpObject {
+            centre: placement.point(centre_m),
+            rotation: placement.turn(),
+            radius_m: radius_m * f64::from(placement.scale),
+            silhouette: None,
+            cuboid: Some(cuboid).filter(|_| self.frame.scene.casts_as_boxes(entity)),
+            sheet: None,
+            opacity: 1.0,
         }
     }
 

@@ -13,7 +13,7 @@
 pub use crate::layout::GROUP_CLUSTERS;
 use crate::layout::{self, ListEntry};
 pub use crate::lists::scene_bounds::{
-    ClusterBounds, EntityBounds, Globe, ListLight, OutlineShape, OutlineView, SceneBounds, distance_key,
+    ClusterBounds, EntityBounds, Globe, ListLight, Occludes, OutlineShape, OutlineView, SceneBounds, distance_key,
 };
 use crate::lists::scope::{CullResult, Scope, SphereView};
 
@@ -69,7 +69,11 @@ pub fn gather(scope: &Scope<'_>, candidates: &Candidates, out: &mut Vec<u32>) ->
         let (light, light_view) = light.unzip();
         results.clear();
         results.extend(candidates.occluders.iter().zip(&views).map(|(&occluder, view)| {
-            if scope.is_own(occluder as usize, sharp) || !scope.may_block(view, light_view, sharp, radiance) {
+            let stands_before = scope.scene.entities[occluder as usize].occludes.stands_before(sharp);
+            if !stands_before
+                || scope.is_own(occluder as usize, sharp)
+                || !scope.may_block(view, light_view, sharp, radiance)
+            {
                 return CullResult::LeftOff;
             }
             match light.filter(|light| sharp && *light != occluder) {
@@ -138,7 +142,7 @@ pub fn gather(scope: &Scope<'_>, candidates: &Candidates, out: &mut Vec<u32>) ->
             occlude(None, false, &|_| true, &results, out);
             return sharp_count;
         };
-        let has = |j: u32| volume.has[j as usize];
+        let has = |j: u32| volume.has.get(j as usize).is_some_and(|has| *has);
         let of_volume = candidates.occluders.iter().zip(&mut results).filter(|(j, _)| is_within && has(**j));
         of_volume.for_each(|(_, result)| *result = CullResult::LeftOff);
         occlude(None, false, &has, &results, out);

@@ -19,7 +19,7 @@ use std::ops::Range;
 /// All that cluster lists and merge depend on at one time.
 pub(crate) struct State {
     pub scene_bounds: SceneBounds,
-    /// The entities as shaders read them.
+    /// The entities as shaders read them, and then the boxes of some of them.
     pub entities: Vec<layout::DeviceEntity>,
     /// Where the entities are; all of the above follows from this.
     pub placements: Vec<Placement>,
@@ -311,6 +311,10 @@ impl ClusterLists {
             let mut candidates = Vec::new();
             let reflects = |j: u32| {
                 let index = j as usize;
+                // Boxes of entities reflect nothing by themselves.
+                if index >= of.reflects.len() {
+                    return false;
+                }
                 let together = scene_bounds.groups.as_ref().is_some_and(|groups| groups.are_one(receiver, index));
                 of.reflects[index] && !together && index != receiver && (rests || !of.rests[index])
             };
@@ -432,11 +436,11 @@ struct Moved<'b> {
 impl<'b> Moved<'b> {
     fn new(before: &'b State, now: &State) -> Self {
         let same = |i: usize| {
-            now.placements[i] == before.placements[i]
+            now.placements.get(i) == before.placements.get(i)
                 && bytemuck::bytes_of(&now.entities[i]) == bytemuck::bytes_of(&before.entities[i])
                 && now.scene_bounds.entities[i] == before.scene_bounds.entities[i]
         };
-        let flags: Vec<bool> = (0..now.placements.len()).map(|i| !same(i)).collect();
+        let flags: Vec<bool> = (0..now.entities.len()).map(|i| !same(i)).collect();
         let list: Vec<usize> = (0..flags.len()).filter(|&i| flags[i]).collect();
         Moved { before, merges_all: list.len() * 8 > flags.len().max(64), flags, list }
     }

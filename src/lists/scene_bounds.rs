@@ -69,7 +69,24 @@ impl ClusterBounds {
     }
 }
 
-/// One entity as the gather sees it.
+/// Before which lights an entity stands.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Occludes {
+    Nothing,
+    /// Before all but sharp ones: there its boxes stand in its place.
+    Soft,
+    /// Before sharp ones alone, as a box of an entity.
+    Sharp,
+    All,
+}
+
+impl Occludes {
+    pub fn stands_before(self, sharp: bool) -> bool {
+        self == Occludes::All || self == if sharp { Occludes::Sharp } else { Occludes::Soft }
+    }
+}
+
+/// One entity, or one of the boxes of an entity, as the gather sees it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct EntityBounds {
     /// Centre of the bounding sphere in the world, metres.
@@ -77,7 +94,7 @@ pub struct EntityBounds {
     pub radius_m: f64,
     /// Share of light that it reflects at most, of any colour.
     pub reflectance: f64,
-    pub occludes: bool,
+    pub occludes: Occludes,
     pub emits: bool,
     pub sharp: bool,
     /// Whether it shines through a radiance field of its own rather than through its occlusion field.
@@ -132,6 +149,7 @@ pub struct ListLight {
 
 /// What the lists are made from at one time.
 pub struct SceneBounds {
+    /// Those of the scene, and then the boxes of some of them.
     pub entities: Vec<EntityBounds>,
     /// Their bounding spheres: centre in the world and radius, metres.
     pub spheres: Vec<[f32; 4]>,
@@ -166,7 +184,8 @@ impl SceneBounds {
     pub fn new(entities: Vec<EntityBounds>, sky: Option<f64>, skip: Skip, eps: f64) -> Self {
         let sphere = |entity: &EntityBounds| entity.centre.as_vec3().extend(entity.radius_m as f32).to_array();
         let spheres: Vec<[f32; 4]> = entities.iter().map(sphere).collect();
-        let occluders: Vec<u32> = (0..entities.len()).filter(|&j| entities[j].occludes).map(|j| j as u32).collect();
+        let occluders: Vec<u32> =
+            (0..entities.len()).filter(|&j| entities[j].occludes != Occludes::Nothing).map(|j| j as u32).collect();
         let lights = entities.iter().enumerate().filter(|(_, entity)| entity.emits).map(|(j, entity)| ListLight {
             facing: entity.facing.map_or([0.0, 0.0, 0.0, -2.0], |(axis, half_angle)| {
                 axis.as_vec3().extend((half_angle + CONE_ROUNDING_RAD).min(PI).cos() as f32).to_array()

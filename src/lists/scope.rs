@@ -9,7 +9,7 @@ use crate::field::silhouette::{INSIDE, REACH, Side};
 use crate::field::sub_light::NEAR_LIGHT_STEPS;
 use crate::field::visibility_volume::SceneVolume;
 use crate::layout::{self, COSINE_LOBE, EVERYTHING};
-use crate::lists::scene_bounds::{ClusterBounds, EntityBounds, Globe, ListLight, OutlineShape, SceneBounds};
+use crate::lists::scene_bounds::{ClusterBounds, EntityBounds, Globe, ListLight, Occludes, OutlineShape, SceneBounds};
 use crate::lists::skip::{CAP_SINES, SKIP_FADE_RAD};
 use crate::lists::tree::Crowd;
 use glam::{DVec2, DVec3};
@@ -174,8 +174,8 @@ impl<'m> Scope<'m> {
 
     /// Whether the own visibility of the cluster has the shadows of an occluder, those of sharp lights or all others.
     pub fn is_own(&self, occluder: usize, sharp: bool) -> bool {
-        self.scene.groups.as_ref().is_some_and(|groups| groups.is_own(self.index, occluder))
-            && (!sharp || self.near.binary_search(&(occluder as u32)).is_ok())
+        (!sharp || self.near.binary_search(&(occluder as u32)).is_ok())
+            && self.scene.groups.as_ref().is_some_and(|groups| groups.is_own(self.index, occluder))
     }
 
     /// The volume whose sky's shadows some vertex reads, and whether all vertices read nothing else of it.
@@ -406,15 +406,16 @@ impl<'m> Scope<'m> {
     /// Whether an entity may stand on the list of any cluster within the bounds.
     pub fn may_list(&self, index: usize) -> bool {
         let EntityBounds { occludes, emits, .. } = self.scene.entities[index];
-        (occludes || emits) && !self.leaves_out(&Crowd::of(self.scene.spheres[index]))
+        (occludes != Occludes::Nothing || emits) && !self.leaves_out(&Crowd::of(self.scene.spheres[index]))
     }
 
     /// Whether an entity stands on the list of the cluster.
     pub fn lists(&self, index: usize, receiver: u32) -> bool {
         let scene = self.scene;
-        let view = scene.entities[index].occludes.then(|| self.view_of(index));
+        let occludes = scene.entities[index].occludes;
+        let view = self.view_of(index);
         let blocks = |light: Option<&SphereView>, sharp, radiance: f32| {
-            !self.is_own(index, sharp) && view.as_ref().is_some_and(|view| self.may_block(view, light, sharp, radiance))
+            occludes.stands_before(sharp) && !self.is_own(index, sharp) && self.may_block(&view, light, sharp, radiance)
         };
         let mut lights = scene.lights.iter().filter(|light| light.entity != receiver);
         scene.sky.is_some_and(|sky| blocks(None, false, sky))

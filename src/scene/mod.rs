@@ -44,6 +44,9 @@ pub use surroundings::Surroundings;
 pub const ENTITY_LIMIT: usize = 4096;
 /// Largest number of meshes in a scene.
 pub const MESH_LIMIT: usize = 1024;
+/// Most boxes in a scene as which solids block sharp lights, and how many entities remain for suns.
+const BOXES_LIMIT: usize = 512;
+const ROOM_FOR_SUNS: usize = 64;
 /// Largest scene file in bytes.
 pub const FILE_LIMIT_BYTES: u64 = 16 << 20;
 
@@ -58,6 +61,8 @@ pub struct Scene {
     pub textures: Vec<Arc<Texture>>,
     /// What textures leave of meshes in which they make holes.
     casters: HashMap<usize, Arc<Mesh>>,
+    /// Meshes that block sharp lights as their boxes.
+    boxed: BTreeSet<usize>,
     /// Entities in the file's order, with their switches resolved, and then suns. [`Scene::at`] gives their placements.
     pub entities: Vec<Entity>,
     /// The surface of each entity ([`Scene::surface`]); empty where all are the meshes themselves.
@@ -220,6 +225,7 @@ impl Scene {
             meshes,
             textures,
             casters: HashMap::new(),
+            boxed: BTreeSet::new(),
             entities,
             surfaces: Vec::new(),
             loose: BTreeSet::new(),
@@ -250,6 +256,37 @@ impl Scene {
             let share = if self.casters.contains_key(&mesh) { 1.0 } else { mask.mean_opacity(&self.meshes[mesh]) };
             self.entities[index].opacity = self.opacity(index) * share;
         }
+        self.choose_boxed();
+    }
+
+    /// Chooses the meshes that block sharp lights as their boxes, those of the largest entities first.
+    fn choose_boxed(&mut self) {
+        let mut counts: HashMap<usize, (usize, f32)> = HashMap::new();
+        for (entity, data) in self.entities.iter().zip(&self.data.entities) {
+            let mesh = self.caster(entity.mesh);
+            let (count, radius_m) = counts.entry(entity.mesh).or_default();
+            *count += mesh.boxes().len();
+            *radius_m = radius_m.max(data.scale * mesh.bounding_sphere().1);
+        }
+        let mut counts: Vec<_> = counts.into_iter().filter(|(_, (count, _))| *count > 0).collect();
+        counts.sort_by(|(a, (_, of_a)), (b, (_, of_b))| of_b.total_cmp(of_a).then(a.cmp(b)));
+        let mut left = BOXES_LIMIT.min(ENTITY_LIMIT.saturating_sub(self.entities.len() + ROOM_FOR_SUNS));
+        let fits = |(mesh, (count, _)): (usize, (usize, f32))| {
+            let fits = count <= left;
+            left -= if fits { count } else { 0 };
+            fits.then_some(mesh)
+        };
+        self.boxed = counts.into_iter().filter_map(fits).collect();
+    }
+
+    /// The boxes as which entities block sharp lights: the entity, and the number of its box.
+    pub(crate) fn boxes(&self) -> Vec<[usize; 2]> {
+        let of_entity = |(index, entity): (usize, &Entity)| {
+            let is_boxed = self.boxed.contains(&entity.mesh);
+            let count = if is_boxed { self.caster(entity.mesh).boxes().len() } else { 0 };
+            (0..count).map(move |number| [index, number])
+        };
+        self.entities.iter().enumerate().flat_map(of_entity).collect()
     }
 
     /// The mesh that casts the shadows of entities of a mesh: itself, or what a texture leaves of it.
@@ -261,6 +298,17 @@ impl Scene {
     pub(crate) fn casts_as_box(&self, entity: usize) -> bool {
         let Entity { mesh, occludes, emits, .. } = self.entities[entity];
         occludes && !emits && self.caster(mesh).cuboid().is_some()
+    }
+
+    /// Whether it does so as the boxes that its mesh consists of. Where these overlap, light may pass neither.
+    pub(crate) fn casts_as_boxes(&self, entity: usize) -> bool {
+        let Entity { mesh, occludes, emits, transparent, opacity, .. } = self.entities[entity];
+        occludes && !emits && !transparent && opacity >= 1.0 && self.boxed.contains(&mesh)
+    }
+
+    /// Whether the same meshes block sharp lights as their boxes in another scene.
+    pub(crate) fn is_boxed_like(&self, other: &Scene) -> bool {
+        self.boxed == other.boxed
     }
 
     /// Whether an entity is a closed surface that lets light through.

@@ -153,10 +153,9 @@ impl SceneBuffers {
         let volume = baked.volume.as_ref().map(|volume| &*volume.volume);
         let FieldAtlas { fields, slots, volume_first } =
             field_atlas::field_atlas(device, scene, &baked.meshes, volume, options)?;
-        let cuboids: Vec<_> = (0..scene.meshes.len()).map(|mesh| scene.caster(mesh).cuboid()).collect();
-        let (silhouettes, mesh_slots) = Silhouettes::new(device, &baked.meshes, &cuboids)?;
-        let casters = (0..scene.meshes.len()).map(|mesh| scene.caster(mesh));
-        let meshes = casters.zip(slots).zip(mesh_slots).map(|((caster, [blocked, radiance]), slots)| {
+        let casters: Vec<_> = (0..scene.meshes.len()).map(|mesh| scene.caster(mesh)).collect();
+        let (silhouettes, mesh_slots) = Silhouettes::new(device, &baked.meshes, &casters)?;
+        let meshes = casters.into_iter().zip(slots).zip(mesh_slots).map(|((caster, [blocked, radiance]), slots)| {
             let (centre, radius_m) = caster.bounding_sphere();
             let rectangle = caster.rectangle();
             let radius_m = f64::from(radius_m);

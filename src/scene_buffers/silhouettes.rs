@@ -1,9 +1,10 @@
 //! All silhouette fields and boxes of a scene in two buffers, and where each begins; and the colours of its lamps.
 
 use super::ALIGNMENT;
+use crate::asset::Mesh;
 use crate::bake::BakedMesh;
 use crate::error::Result;
-use crate::field::cuboid::Cuboid;
+use crate::field::cuboid::{Cuboid, PlacedCuboid};
 use crate::field::lamp_colors::LampColors;
 use crate::field::silhouette::SilhouetteField;
 use crate::gpu::{Buffer, Device};
@@ -34,18 +35,16 @@ pub struct MeshSlots {
     pub silhouette: Option<Slot<Arc<SilhouetteField>>>,
     /// The box that it is, if it is one.
     pub cuboid: Option<Slot<Cuboid>>,
+    /// Where each of the boxes begins that it consists of.
+    pub boxes: Vec<Slot<PlacedCuboid>>,
     /// Its colours, if it is a lamp with colours of its parts.
     pub lamp_colors: Option<Slot<Arc<LampColors>>>,
 }
 
 impl Silhouettes {
-    /// Uploads the fields of a scene's meshes and the boxes that they are, and returns each mesh's place. Meshes that
-    /// share a field share its place.
-    pub fn new(
-        device: &Arc<Device>,
-        baked: &[BakedMesh],
-        cuboids: &[Option<Cuboid>],
-    ) -> Result<(Self, Vec<MeshSlots>)> {
+    /// Uploads the fields of a scene's meshes and the boxes that `casters` are or consist of, and returns each mesh's
+    /// place. Meshes that share a field share its place.
+    pub fn new(device: &Arc<Device>, baked: &[BakedMesh], casters: &[&Arc<Mesh>]) -> Result<(Self, Vec<MeshSlots>)> {
         let mut nodes = Vec::<[f32; 4]>::new();
         let mut cells = Vec::<[u32; 2]>::new();
         let mut known = HashMap::<*const SilhouetteField, u32>::new();
@@ -60,12 +59,17 @@ impl Silhouettes {
             Slot { first_quad: first_quad | halves, content: field.clone() }
         };
         let silhouettes: Vec<_> = baked.iter().map(|mesh| mesh.silhouette.as_ref().map(&mut slot)).collect();
-        let mut cuboid_slot = |cuboid: &Cuboid| {
+        let mut add_cuboid = |cuboid: &Cuboid| {
             let first_quad = nodes.len() as u32;
             nodes.extend(cuboid.quads());
-            Slot { first_quad, content: *cuboid }
+            first_quad
         };
-        let cuboids: Vec<_> = cuboids.iter().map(|cuboid| cuboid.as_ref().map(&mut cuboid_slot)).collect();
+        let mut boxes_of = |caster: &&Arc<Mesh>| {
+            let whole = caster.cuboid().map(|content| Slot { first_quad: add_cuboid(&content), content });
+            let slot = |content: &PlacedCuboid| Slot { first_quad: add_cuboid(&content.cuboid), content: *content };
+            (whole, caster.boxes().iter().map(slot).collect::<Vec<_>>())
+        };
+        let boxes: Vec<_> = casters.iter().map(&mut boxes_of).collect();
         let mut known_colors = HashMap::<*const LampColors, u32>::new();
         let mut colors_slot = |colors: &Arc<LampColors>| {
             let first_quad = *known_colors.entry(Arc::as_ptr(colors)).or_insert_with(|| {
@@ -76,9 +80,10 @@ impl Silhouettes {
             Slot { first_quad, content: colors.clone() }
         };
         let colors = baked.iter().map(|mesh| mesh.lamp_colors.as_ref().map(&mut colors_slot));
-        let slots = silhouettes.into_iter().zip(cuboids).zip(colors);
-        let slots = slots.map(|((silhouette, cuboid), lamp_colors)| MeshSlots { silhouette, cuboid, lamp_colors });
-        let slots = slots.collect();
+        let slots = silhouettes.into_iter().zip(boxes).zip(colors);
+        let slots = slots
+            .map(|((silhouette, (cuboid, boxes)), lamp_colors)| MeshSlots { silhouette, cuboid, boxes, lamp_colors })
+            .collect();
         nodes.resize(nodes.len().max(ALIGNMENT as usize / 16), [0.0; 4]);
         cells.resize(cells.len().max(ALIGNMENT as usize / 8), [0; 2]);
         let nodes = Buffer::with_data(device, "silhouette nodes", &nodes)?;

@@ -192,6 +192,35 @@ pub fn of_quads(name: &str, corners: Vec<Vec3>) -> Mesh {
     Mesh::new(name, corners, Vec::new(), None, triangles).unwrap()
 }
 
+/// A solid of some of the cells between planes along each axis, which cut its faces too.
+pub fn of_cells(planes: [&[f32]; 3], holds: impl Fn([usize; 3]) -> bool) -> Mesh {
+    let exists = |cell: [usize; 3]| (0..3).all(|axis| cell[axis] + 1 < planes[axis].len());
+    let place = |corner: [usize; 3]| Vec3::from_array(std::array::from_fn(|axis| planes[axis][corner[axis]]));
+    let [x, y, z] = planes.map(|planes| planes.len() - 1);
+    let mut corners = Vec::new();
+    for cell in (0..x * y * z).map(|i| [i / (y * z), i / z % y, i % z]).filter(|cell| holds(*cell)) {
+        for (axis, end) in [(0, 0), (0, 1), (1, 0), (1, 1), (2, 0), (2, 1)] {
+            let mut beside = cell;
+            beside[axis] = if end == 1 { cell[axis] + 1 } else { cell[axis].wrapping_sub(1) };
+            if beside[axis] != usize::MAX && exists(beside) && holds(beside) {
+                continue;
+            }
+            let mut quad = [[0, 0], [1, 0], [1, 1], [0, 1]].map(|[i, j]| {
+                let mut corner = cell;
+                corner[axis] += end;
+                corner[(axis + 1) % 3] += i;
+                corner[(axis + 2) % 3] += j;
+                place(corner)
+            });
+            if end == 0 {
+                quad.reverse();
+            }
+            corners.extend(quad);
+        }
+    }
+    of_quads("solid", corners)
+}
+
 /// A mesh's places and triangles as OBJ text.
 pub fn obj(mesh: &Mesh) -> String {
     let places = mesh.positions.iter().map(|p| format!("v {} {} {}\n", p.x, p.y, p.z));

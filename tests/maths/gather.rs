@@ -2,7 +2,9 @@
 
 use glam::{DQuat, DVec3};
 use shadow_fields::layout::{DeviceEntity, ListEntry};
-use shadow_fields::lists::gather::{self, Candidates, ClusterBounds, EntityBounds, GROUP_CLUSTERS, SceneBounds};
+use shadow_fields::lists::gather::{
+    self, Candidates, ClusterBounds, EntityBounds, GROUP_CLUSTERS, Occludes, SceneBounds,
+};
 use shadow_fields::lists::scope::Scope;
 use shadow_fields::lists::skip::Skip;
 use shadow_fields::sh::quadrature::random_direction;
@@ -28,7 +30,7 @@ fn random_entities(rng: &mut fastrand::Rng, count: usize, spread_m: f64, corner:
             centre: corner + DVec3::new(rng.f64() - 0.5, 0.1 * rng.f64(), rng.f64() - 0.5) * spread_m,
             radius_m: 0.1 + 0.4 * rng.f64(),
             reflectance: 0.3 + 0.7 * rng.f64(),
-            occludes: i % 5 != 0,
+            occludes: if i % 5 != 0 { Occludes::All } else { Occludes::Nothing },
             emits: i % 25 == 0,
             coloured: i % 50 == 0,
             radiance: 3.0 * rng.f64(),

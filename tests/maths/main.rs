@@ -1,5 +1,6 @@
 //! Mathematics on the processor: spherical harmonics, lattices, lists of clusters, rays.
 
+mod boxes;
 mod chain;
 #[path = "../common/mod.rs"]
 mod common;

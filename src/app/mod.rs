@@ -14,7 +14,6 @@ mod output;
 mod outputs;
 mod profile;
 mod render;
-mod sheet;
 mod source;
 #[cfg(feature = "view")]
 mod view;
@@ -50,7 +49,7 @@ enum Subcommands {
     Bake(bake::Arguments),
     /// Write a glTF file as a scene file with its meshes, to be edited
     Import(import::Arguments),
-    /// Show what is in an .sf file: header, one lookup, contact sheets
+    /// Show what is in an .sf file: its header, one lookup
     Inspect(inspect::Arguments),
     /// Measure error, time and stability and write tables
     Bench(bench::Arguments),

@@ -35,7 +35,7 @@ fn meshes_scenes_and_fields() {
     // Each byte of a field file is cut and flipped in `tests/files/field_file.rs`.
     folder.refused("inspect none.sf", 4, &["none.sf: ", "o such file"]);
     folder.write("d.sf", "not a field at all, but long enough to hold the first part of one");
-    folder.refused("inspect d.sf --json --faces o.png", 4, &["d.sf: ", "not a field file"]);
+    folder.refused("inspect d.sf --json", 4, &["d.sf: ", "not a field file"]);
 }
 
 #[test]

@@ -17,7 +17,7 @@ const MESH: &str = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 
 /// Every kind of command that writes, and what it writes. Those whose files hold times, `bench` and `profile`, write
 /// them likewise; `farm` has tests of its own. What the first one writes is an input of
 /// others.
-const COMMANDS: [(&str, &[&str]); 7] = [
+const COMMANDS: [(&str, &[&str]); 6] = [
     ("bake m.obj -o f.sf --lattice cube:3x3 --face-px 8", &["f.sf"]),
     (
         "render scene.toml -o p.png --exr p.exr --vertices v.csv --variant storage --lattice cube:2x3 --face-px 4 \
@@ -30,7 +30,6 @@ const COMMANDS: [(&str, &[&str]); 7] = [
         &["n00.png", "n01.png", "n02.png"],
     ),
     ("import t.gltf -o i.toml", &["i.toml"]),
-    ("inspect ../good/f.sf --faces c.png", &["c.png"]),
     ("compare ../good/a.png ../good/a.png -o d.png", &["d.png"]),
 ];
 

@@ -104,7 +104,6 @@ fn every_output_asks_for_its_ending() {
         ("bake tri.obj -o tri.obj", "tri.obj", ".sf"),
         ("import model.gltf -o model.gltf", "model.gltf", ".toml"),
         ("compare a.png b.png -o a", "a", ".png"),
-        ("inspect f.sf --faces f.sf", "f.sf", ".png"),
         ("farm plan s.toml -o s.toml", "s.toml", ".json"),
     ] {
         refused(&folder, line, 2, &[file, ending]);

@@ -1,7 +1,7 @@
 //! `shadow-fields bake` bakes the field of one mesh.
 
 use super::context::Context;
-use super::outputs::{Output, Outputs};
+use super::outputs::{self, Output};
 use super::source::GltfArguments;
 use super::{Global, output};
 use crate::asset::Mesh;
@@ -66,7 +66,7 @@ fn shining(mesh: Mesh, radiance: Vec3, path: &Path) -> Result<Mesh> {
 /// Bakes one field, without the cache.
 pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
     let inputs = scene::files::of_mesh(&arguments.mesh);
-    Outputs::check(&inputs, &[Output::new("--output", &arguments.output, "sf")])?;
+    outputs::check(&inputs, &[Output::new("--output", &arguments.output, "sf")])?;
     let mut mesh = arguments.gltf.mesh(global, &arguments.mesh)?;
     let options = arguments.options()?;
     if let Some(radiance) = arguments.radiance {

@@ -1,6 +1,6 @@
 //! `shadow-fields compare` measures how two pictures differ.
 
-use super::outputs::{Output, Outputs};
+use super::outputs::{self, Output};
 use super::{Global, output};
 use crate::asset::decode::Picture;
 use crate::asset::false_color::{ColorScale, NEUTRAL, Scheme};
@@ -49,7 +49,7 @@ pub struct Arguments {
 pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
     if let Some(path) = &arguments.output {
         let inputs = [&arguments.first, &arguments.second].into_iter().chain(&arguments.mask).cloned();
-        Outputs::check(&inputs.collect::<Vec<_>>(), &[Output::new("--output", path, "png")])?;
+        outputs::check(&inputs.collect::<Vec<_>>(), &[Output::new("--output", path, "png")])?;
     }
     let [a, b] = [&arguments.first, &arguments.second].map(|path| Picture::read(path));
     let a = a?;

@@ -1,6 +1,6 @@
 //! `shadow-fields import` writes a glTF file as a scene file.
 
-use super::outputs::{Output, Outputs};
+use super::outputs::{self, Output};
 use super::source::GltfSceneArguments;
 use super::{Global, output};
 use crate::error::{Error, Result, one_line};
@@ -59,7 +59,7 @@ pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
     }
     let inputs = scene::files::of_scene(&arguments.scene);
     let output = Output::new("--output", &arguments.output, "toml");
-    Outputs::check(&inputs, std::slice::from_ref(&output))?;
+    outputs::check(&inputs, std::slice::from_ref(&output))?;
     arguments.check_own(&arguments.output)?;
     let scene: Scene = arguments.gltf.scene(global, &arguments.scene, arguments.time)?;
     let mut data = scene.data.clone();

@@ -33,60 +33,35 @@ impl Output {
     }
 }
 
-/// The files that a command is about to write.
-pub struct Outputs {
-    /// Each file with its identity before the command ran.
-    before: Vec<(PathBuf, Option<Identity>)>,
-}
-
-impl Outputs {
-    /// Fails where a name has another ending than its kind, where a file would replace one that is read or that another
-    /// option writes, also through links, and where one cannot be written.
-    pub fn check(inputs: &[PathBuf], outputs: &[Output]) -> Result<Self> {
-        let read: HashMap<Identity, &PathBuf> =
-            inputs.iter().filter_map(|path| Some((files::identity(path)?, path))).collect();
-        let mut taken: HashMap<Identity, (&str, &Path)> = HashMap::new();
-        let mut before = Vec::new();
-        for Output { option, ending, files } in outputs {
-            check_ending(option, &files[0], ending)?;
-            for file in files {
-                let identity = files::identity(file);
-                before.push((file.clone(), identity.clone()));
-                let Some(identity) = identity else { continue };
-                let shown = file.display();
-                if let Some(input) = read.get(&identity) {
-                    let what = format!("{option} {shown} would replace the input {}", input.display());
-                    return Err(Error::Usage(what));
-                }
-                if let Some((other, first)) = taken.insert(identity, (option, file)) {
-                    let what = format!("{option} {shown} would replace what {other} {} writes", first.display());
-                    return Err(Error::Usage(what));
-                }
+/// Fails where a name has another ending than its kind, where a file would replace one that is read or that another
+/// option writes, also through links, and where one cannot be written.
+pub fn check(inputs: &[PathBuf], outputs: &[Output]) -> Result<()> {
+    let read: HashMap<Identity, &PathBuf> =
+        inputs.iter().filter_map(|path| Some((files::identity(path)?, path))).collect();
+    let mut taken: HashMap<Identity, (&str, &Path)> = HashMap::new();
+    for Output { option, ending, files } in outputs {
+        check_ending(option, &files[0], ending)?;
+        for file in files {
+            let Some(identity) = files::identity(file) else { continue };
+            let shown = file.display();
+            if let Some(input) = read.get(&identity) {
+                let what = format!("{option} {shown} would replace the input {}", input.display());
+                return Err(Error::Usage(what));
             }
-        }
-        for Output { files, .. } in outputs {
-            // The others of a run stand in the same folder.
-            for (_, file) in files.iter().enumerate().filter(|(index, file)| *index == 0 || file.exists()) {
-                let cannot = |error| Error::Failed(format!("{}: cannot be written: {error}", file.display()));
-                files::check_writable(file).map_err(cannot)?;
+            if let Some((other, first)) = taken.insert(identity, (option, file)) {
+                let what = format!("{option} {shown} would replace what {other} {} writes", first.display());
+                return Err(Error::Usage(what));
             }
-        }
-        Ok(Outputs { before })
-    }
-
-    /// Adds to an error which of the files are written already.
-    pub fn after(&self, error: Error) -> Error {
-        let is_new = |(file, before): &&(PathBuf, Option<Identity>)| files::identity(file) != *before;
-        let written: Vec<String> =
-            self.before.iter().filter(is_new).map(|(file, _)| file.display().to_string()).collect();
-        match &written[..] {
-            [] => error,
-            [first, _, _, .., last] => {
-                error.followed_by(format!("{} files from {first} to {last} are written", written.len()))
-            }
-            few => error.followed_by(format!("already written: {}", few.join(", "))),
         }
     }
+    for Output { files, .. } in outputs {
+        // The others of a run stand in the same folder.
+        for (_, file) in files.iter().enumerate().filter(|(index, file)| *index == 0 || file.exists()) {
+            let cannot = |error| Error::Failed(format!("{}: cannot be written: {error}", file.display()));
+            files::check_writable(file).map_err(cannot)?;
+        }
+    }
+    Ok(())
 }
 
 /// Makes the folder that results of several names go to. Fails where it holds an input, which one of them might

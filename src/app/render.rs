@@ -1,7 +1,7 @@
 //! `shadow-fields render` renders a scene to pictures, or to a table of vertices.
 
 use super::context::Context;
-use super::outputs::{Numbered, Output, Outputs};
+use super::outputs::{self, Numbered, Output};
 use super::source::{GltfSceneArguments, LookArguments};
 use super::{Global, output};
 use crate::asset::picture;
@@ -77,8 +77,8 @@ impl Arguments {
         self.rays.unwrap_or(if self.reference { 256 } else { 1024 })
     }
 
-    /// All files that are to be written, none of which may be one that the scene names.
-    fn outputs(&self) -> Result<Outputs> {
+    /// Compares all files that are to be written with those that the scene names.
+    fn check_outputs(&self) -> Result<()> {
         let numbers = self.first..self.first + self.frames;
         let mut outputs = vec![Output::pictures("--output", &self.output, "png", numbers.clone())?];
         if let Some(path) = &self.exr {
@@ -90,7 +90,7 @@ impl Arguments {
         outputs.extend(given.map(|(option, path, ending)| Output::new(option, path, ending)));
         let mut inputs = scene::files::of_scene(&self.scene);
         inputs.extend(self.look.picture().map(Path::to_owned));
-        Outputs::check(&inputs, &outputs)
+        outputs::check(&inputs, &outputs)
     }
 }
 
@@ -115,11 +115,7 @@ impl PictureArguments {
 }
 
 pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
-    let outputs = arguments.outputs()?;
-    render(global, arguments).map_err(|error| outputs.after(error))
-}
-
-fn render(global: &Global, arguments: &Arguments) -> Result<()> {
+    arguments.check_outputs()?;
     let mut scene = arguments.gltf.scene(global, &arguments.scene, arguments.picture.time.unwrap_or(0.0))?;
     let size = arguments.picture.options.frame(&scene)?.size;
     let first_s = arguments.picture.first_s(&scene);

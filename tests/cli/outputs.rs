@@ -147,9 +147,9 @@ fn what_cannot_be_written_is_found_at_the_start() {
     }
 }
 
-/// A disk may become full later: the message says what is there already.
+/// A disk may become full later.
 #[test]
-fn a_late_failure_tells_what_is_written() {
+fn a_late_failure_names_its_file() {
     if !has_device() {
         return;
     }
@@ -159,7 +159,6 @@ fn a_late_failure_tells_what_is_written() {
     let ran = finish(&mut limited(&render, "ulimit -f 64"));
     assert_eq!((ran.code, ran.stderr.lines().count()), (1, 1), "{}", ran.stderr);
     assert!(ran.stderr.contains("v.csv: cannot be written: File too large"), "{}", ran.stderr);
-    assert!(ran.stderr.trim_end().ends_with("already written: o.png"), "{}", ran.stderr);
 }
 
 /// Runs a command, which ends with code 124 where it waits without end.

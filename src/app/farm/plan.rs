@@ -1,7 +1,7 @@
 //! `shadow-fields farm plan` cuts bakes and pictures into slices.
 
 use super::super::context::Context;
-use super::super::outputs::{Numbered, Output, Outputs, check_ending};
+use super::super::outputs::{self, Numbered, Output, check_ending};
 use super::super::render::PictureArguments;
 use super::super::{Global, output};
 use super::run::scene_hash;
@@ -117,7 +117,7 @@ fn check_outputs(arguments: &Arguments, inputs: &[PathBuf], folder: &Path, patte
             outputs.push(Output::new("--pictures", first, "png").with(pictures));
         }
     }
-    Outputs::check(inputs, &outputs)?;
+    outputs::check(inputs, &outputs)?;
     if path.is_file() && !arguments.force && !Plan::is_at(path) {
         return Err(Error::Usage(format!("{} is no plan; --force replaces it", path.display())));
     }

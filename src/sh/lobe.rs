@@ -4,7 +4,7 @@ use std::f64::consts::PI;
 
 use glam::DVec3;
 
-use super::basis::{MAX_BANDS, coefficient_count, values};
+use super::basis::{coefficient_count, values};
 
 /// Turns a function that is symmetric about +z to `axis` (unit): `z[l]` is its coefficient of Y_l0.
 ///
@@ -17,24 +17,6 @@ pub fn zonal(bands: usize, z: &[f64], axis: DVec3) -> Vec<f64> {
         coefficients.extend(basis[l * l..(l + 1) * (l + 1)].iter().map(|y| scale * y));
     }
     coefficients
-}
-
-/// The zonal coefficients of a cap about +z whose half angle has the cosine `c`: 1 inside, 0 outside.
-///
-/// z_0 = sqrt(pi) (1 - c), z_l = sqrt(pi / (2l + 1)) (P_l-1(c) - P_l+1(c)), the integral of Y_l0 over the cap.
-pub fn cap_zonal(bands: usize, c: f64) -> Vec<f64> {
-    let mut legendre = [1.0, c, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0];
-    for l in 2..=bands.min(MAX_BANDS) {
-        let lf = l as f64;
-        legendre[l] = ((2.0 * lf - 1.0) * c * legendre[l - 1] - (lf - 1.0) * legendre[l - 2]) / lf;
-    }
-    let band = |l: usize| (PI / (2 * l + 1) as f64).sqrt() * (legendre[l - 1] - legendre[l + 1]);
-    (0..bands).map(|l| if l == 0 { PI.sqrt() * (1.0 - c) } else { band(l) }).collect()
-}
-
-/// The blocked part of a cap: the SH of 1 within `half_angle_rad` (0 to pi) of the unit vector `axis`, 0 elsewhere.
-pub fn cap(bands: usize, axis: DVec3, half_angle_rad: f64) -> Vec<f64> {
-    zonal(bands, &cap_zonal(bands, half_angle_rad.cos()), axis)
 }
 
 /// The SH of max(0, n . w) for the unit vector `normal`.

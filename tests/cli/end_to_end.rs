@@ -1,12 +1,11 @@
 //! What commands write, where, and that it is what it should be.
 
 use crate::cli::{Folder, SMALL, cache, finish};
-use crate::common::names;
+use crate::common::{cap, names};
 use glam::DVec3;
 use serde_json::{Value, json};
 use shadow_fields::asset::picture::srgb_from_linear;
 use shadow_fields::scene::Scene;
-use shadow_fields::sh::lobe::cap;
 use std::path::Path;
 
 const SCENE: &str = "assets/scenes/sphere_over_plane.toml";

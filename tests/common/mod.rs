@@ -8,7 +8,7 @@
 
 pub use shadow_fields::asset::generate;
 
-use glam::Vec3;
+use glam::{DVec3, Vec3};
 use shadow_fields::asset::Mesh;
 use shadow_fields::bake::cache::Cache;
 use shadow_fields::bake::{self, Baker};
@@ -19,7 +19,10 @@ use shadow_fields::gpu::{Device, DeviceOptions, Validation};
 use shadow_fields::lists::skip::Skip;
 use shadow_fields::merge::variant::{MergePermutation, VARIANTS};
 use shadow_fields::scene::{Placement, Scene};
+use shadow_fields::sh::basis::MAX_BANDS;
+use shadow_fields::sh::lobe::zonal;
 use shadow_fields::shaders::Library;
+use std::f64::consts::PI;
 use std::path::{Path, PathBuf};
 use std::process::Child;
 use std::sync::{Arc, Mutex, MutexGuard, OnceLock};
@@ -40,6 +43,24 @@ pub fn skip(reason: &str) {
 #[allow(clippy::print_stderr)]
 pub fn report(line: &str) {
     eprintln!("{line}");
+}
+
+/// The zonal coefficients of a cap about +z whose half angle has the cosine `c`: 1 inside, 0 outside.
+///
+/// z_0 = sqrt(pi) (1 - c), z_l = sqrt(pi / (2l + 1)) (P_l-1(c) - P_l+1(c)), the integral of Y_l0 over the cap.
+fn cap_zonal(bands: usize, c: f64) -> Vec<f64> {
+    let mut legendre = [1.0, c, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0];
+    for l in 2..=bands.min(MAX_BANDS) {
+        let lf = l as f64;
+        legendre[l] = ((2.0 * lf - 1.0) * c * legendre[l - 1] - (lf - 1.0) * legendre[l - 2]) / lf;
+    }
+    let band = |l: usize| (PI / (2 * l + 1) as f64).sqrt() * (legendre[l - 1] - legendre[l + 1]);
+    (0..bands).map(|l| if l == 0 { PI.sqrt() * (1.0 - c) } else { band(l) }).collect()
+}
+
+/// The blocked part of a cap: the SH of 1 within `half_angle_rad` (0 to pi) of the unit vector `axis`, 0 elsewhere.
+pub fn cap(bands: usize, axis: DVec3, half_angle_rad: f64) -> Vec<f64> {
+    zonal(bands, &cap_zonal(bands, half_angle_rad.cos()), axis)
 }
 
 /// Names in a folder, sorted.

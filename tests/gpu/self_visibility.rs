@@ -1,6 +1,6 @@
 //! Self-visibility: closed forms, the shader's lookup against Rust's, direct light against rays.
 
-use crate::common::{generate, gpu, inside_out, parse};
+use crate::common::{cap, generate, gpu, inside_out, parse};
 use glam::{DVec3, Vec3, Vec4};
 use shadow_fields::asset::Mesh;
 use shadow_fields::bake::surfaces::{BakedSurface, GroupPlan};
@@ -12,7 +12,6 @@ use shadow_fields::field::self_visibility::{
 use shadow_fields::field::sub_light::{LightPart, SeenLight};
 use shadow_fields::gpu::{Bind, Buffer, Commands, ComputePipeline};
 use shadow_fields::scene::Placement;
-use shadow_fields::sh::lobe;
 use shadow_fields::sh::quadrature::random_direction;
 use shadow_fields::shaders::{Library, ShaderPermutation};
 use shadow_fields::truth::{Vertex, World};
@@ -190,7 +189,7 @@ fn direct_light_is_that_of_rays() {
                     whole += ray.dot(normal) / 96.0;
                     exact += if world.blocks_itself(&view, ray, f64::INFINITY) { 0.0 } else { ray.dot(normal) / 96.0 };
                 }
-                let cap = lobe::cap(4, toward, angle);
+                let cap = cap(4, toward, angle);
                 let sh = transfer.iter().zip(&cap).map(|(t, c)| f64::from(*t) * c).sum::<f64>();
                 let sh = (sh / (TAU * (1.0 - angle.cos()))).max(0.0);
                 sums[0] += (by_map(map, normal, toward, angle) - exact).powi(2);

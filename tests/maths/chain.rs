@@ -1,10 +1,11 @@
 //! Long chains of products, behind which the guard keeps light from growing.
 
+use crate::common::cap;
 use glam::DVec3;
 use half::f16;
 use shadow_fields::merge::chain::{ChainState, Multiplier};
 use shadow_fields::sh::basis::MAX_COEFFICIENTS;
-use shadow_fields::sh::lobe::{cap, clamped_cosine};
+use shadow_fields::sh::lobe::clamped_cosine;
 use shadow_fields::sh::quadrature::sphere_rule;
 use std::f64::consts::PI;
 

@@ -2,7 +2,7 @@
 
 mod cache;
 
-use crate::common::{Gpu, generate, gpu, relative_rms};
+use crate::common::{Gpu, cap, generate, gpu, relative_rms};
 use fastrand::Rng;
 use glam::DVec3;
 use shadow_fields::asset::Mesh;
@@ -11,7 +11,6 @@ use shadow_fields::bake::surface::{Surface, inside, pushed_out};
 use shadow_fields::bake::triangles::unit_positions;
 use shadow_fields::bake::{self, TRANSFER_OFFSET, capture};
 use shadow_fields::field::{FieldKind, ShadowField, Storage};
-use shadow_fields::sh::lobe;
 use shadow_fields::sh::quadrature::random_direction;
 use std::cell::RefCell;
 
@@ -53,7 +52,7 @@ fn sphere_has_its_closed_form() {
         let p = random_direction(&mut rng) * 1.05 * (8.0_f64 / 1.05).powf(rng.f64());
         let mut found = [0.0; 16];
         field.lookup(p, 0, &mut found);
-        let wanted = lobe::cap(4, -p.normalize(), p.length().recip().asin());
+        let wanted = cap(4, -p.normalize(), p.length().recip().asin());
         relative_rms(found.into_iter().zip(wanted))
     });
     let errors: Vec<f64> = errors.collect();

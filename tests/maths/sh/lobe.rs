@@ -3,9 +3,10 @@
 use std::f64::consts::PI;
 
 use super::assert_close;
+use crate::common::cap;
 use glam::DVec3;
 use shadow_fields::sh::basis::{MAX_BANDS, coefficient_count, values};
-use shadow_fields::sh::lobe::{cap, clamped_cosine, zonal};
+use shadow_fields::sh::lobe::{clamped_cosine, zonal};
 use shadow_fields::sh::quadrature::sphere_rule;
 
 const AXES: [DVec3; 4] = [

@@ -1,8 +1,8 @@
 //! Spherical polygons: the closed form against known solids and against quadrature.
 
+use crate::common::cap;
 use glam::{DQuat, DVec3};
 use shadow_fields::sh::basis::{Y00, evaluate};
-use shadow_fields::sh::lobe::cap;
 use shadow_fields::sh::polygon::{POLYGON_BANDS, POLYGON_COEFFICIENTS, polygon};
 use std::f64::consts::PI;
 

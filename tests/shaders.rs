@@ -2,6 +2,7 @@
 
 mod common;
 
+use ash::vk;
 use common::{library, skip, usual_permutation};
 use shadow_fields::bake::assemble::Assemble;
 use shadow_fields::bake::capture::Capture;
@@ -18,6 +19,8 @@ use shadow_fields::draw::smooth::Smooth;
 use shadow_fields::draw::triangles::{Detail, DrawTriangles, Form, Look};
 use shadow_fields::field::{FieldKind, Storage};
 use shadow_fields::gloss::gloss_row;
+use shadow_fields::gpu::Shader;
+use shadow_fields::gpu::reflect::Reflection;
 use shadow_fields::lists::skip::Skip;
 use shadow_fields::merge::variant::{MergePermutation, Reads, VARIANTS, Variant};
 use shadow_fields::shaders::{FILES, ShaderPermutation};
@@ -170,6 +173,16 @@ fn merging() -> Vec<ShaderPermutation> {
     permutations.iter().map(MergePermutation::row).collect()
 }
 
+/// Asserts that a shader asks for no more than every device of Vulkan 1.3 has. Storage buffers and sampled images are
+/// compared with each device's own numbers.
+fn assert_served(shader: &Shader) {
+    let Reflection { push_bytes, shared_bytes, local_size, bindings, .. } = &shader.reflection;
+    let invocations: u32 = local_size.iter().product();
+    assert!(*push_bytes <= 128 && *shared_bytes <= 16_384 && invocations <= 128, "{}", shader.name);
+    let uniform = bindings.iter().filter(|binding| binding.kind == vk::DescriptorType::UNIFORM_BUFFER).count();
+    assert!(uniform <= 12 && bindings.len() <= 128, "{}", shader.name);
+}
+
 /// Compiles every row and lets spirv-val judge what comes out, each different row once.
 fn check(rows: Vec<ShaderPermutation>) {
     let validator = || Command::new("spirv-val");
@@ -183,6 +196,7 @@ fn check(rows: Vec<ShaderPermutation>) {
             continue;
         }
         let shader = library().shader(&row).unwrap_or_else(|error| panic!("{row:?}: {error}"));
+        assert_served(&shader);
         if has_validator {
             let file = tempfile::NamedTempFile::new().unwrap();
             std::fs::write(file.path(), bytemuck::cast_slice(&shader.spirv)).unwrap();

@@ -50,17 +50,9 @@ const OTHERS: &[Row<Claims>] = &[
 #[rustfmt::skip]
 const LIMITS: &[Row<fn(&mut ash::vk::PhysicalDeviceLimits)>] = &[
     ("128 bytes of push constants", "", |l| l.max_push_constants_size = 128, Same),
-    ("16 bytes of push constants", "", |l| l.max_push_constants_size = 16,
-        Refused(3, "bytes of push constants, the device takes 16")),
     ("128 invocations a workgroup", "", |l| l.max_compute_work_group_invocations = 128, Same),
-    ("16 invocations a workgroup", "", |l| l.max_compute_work_group_invocations = 16,
-        Refused(3, "invocations a workgroup, the device takes 16")),
     ("128 invocations along x", "", |l| l.max_compute_work_group_size = [128, 128, 64], Same),
-    ("8 invocations along x", "", |l| l.max_compute_work_group_size = [8, 128, 64],
-        Refused(3, "invocations a workgroup along x, the device takes 8")),
     ("16 KiB of shared memory", "", |l| l.max_compute_shared_memory_size = 16384, Same),
-    ("64 bytes of shared memory", "", |l| l.max_compute_shared_memory_size = 64,
-        Refused(3, "bytes of memory shared by a workgroup, the device takes 64")),
     ("4 storage buffers a stage", "", |l| l.max_per_stage_descriptor_storage_buffers = 4,
         Refused(3, "storage buffers a stage, the device takes 4")),
     ("12 uniform buffers a stage", "", |l| l.max_per_stage_descriptor_uniform_buffers = 12, Same),

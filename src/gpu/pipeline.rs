@@ -189,7 +189,6 @@ pub struct GraphicsPipeline {
     handle: Owned<vk::Pipeline>,
     pub(super) layout: Layout,
     pub(super) inputs: Vec<VertexInput>,
-    pub state: GraphicsState,
     pub name: String,
 }
 
@@ -255,7 +254,7 @@ impl GraphicsPipeline {
                 .checked("vkCreateGraphicsPipelines", name)
         })?[0];
         let handle = Owned::new(device, name, handle, ash::Device::destroy_pipeline);
-        Ok(GraphicsPipeline { handle, layout, inputs, state, name: name.into() })
+        Ok(GraphicsPipeline { handle, layout, inputs, name: name.into() })
     }
 
     pub(super) fn raw(&self) -> vk::Pipeline {

@@ -8,7 +8,6 @@ use super::viewer::{Previewed, Viewer};
 use crate::asset::environment::EnvironmentData;
 use crate::bake::cache::Cache;
 use crate::bake::{self, Baker, SceneNeeds};
-use crate::draw::show::Show;
 use crate::error::Result;
 use crate::frame::{self, Frame, RadiositySource, Viewport};
 use crate::gpu::validation::Messages;
@@ -188,35 +187,6 @@ impl Viewer {
         self.drawn_before = Some(self.frame_count);
         self.pending |= Changed { placements: true, camera: true, ..Changed::default() };
         self.version += 1;
-    }
-
-    /// Compiles all shaders anew after a change of their files. Where one does not compile, what there was stays.
-    pub(super) fn reload(&mut self, files: &[String]) {
-        self.baker = Baker::new(&self.setup.device, &self.setup.library);
-        match self.try_reload() {
-            Ok(()) => {
-                log::info!("shaders rebuilt: {}", files.join(", "));
-                self.say(Some(format!("shaders rebuilt: {}", files.join(", "))));
-                self.shader_error = None;
-            }
-            Err(error) => {
-                error.to_string().lines().for_each(|line| log::warn!("{line}"));
-                self.shader_error = Some(error.to_string());
-            }
-        }
-        self.pending.display = true;
-    }
-
-    fn try_reload(&mut self) -> Result<()> {
-        let show = Show::new(&self.setup.device, &self.setup.library, self.setup.format)?;
-        self.overlay.reload(&self.setup.library)?;
-        // Beside a bake the frame that follows it compiles them.
-        if self.frame.is_some() && self.bake.is_none() {
-            let frame = self.new_frame()?;
-            self.take(frame);
-        }
-        self.show = show;
-        Ok(())
     }
 
     /// Decides whether the next picture is refined; `moves` if it differs from the last in more than the overlay.

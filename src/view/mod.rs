@@ -16,7 +16,6 @@ mod overlay;
 pub mod panel;
 pub mod pick;
 mod picture;
-pub mod reload;
 pub mod scenes;
 pub mod task;
 pub mod viewer;

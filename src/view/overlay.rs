@@ -63,19 +63,15 @@ pub struct Overlay {
     points: [f32; 2],
 }
 
-fn pipeline(device: &Arc<Device>, library: &Library, color: vk::Format) -> Result<GraphicsPipeline> {
-    let state = GraphicsState { keeps: Keeps::Over, ..GraphicsState::plain(color) };
-    let vertex = library.shader(&ShaderPermutation::new("overlay.vert", 4))?;
-    let fragment = library.shader(&ShaderPermutation::new("overlay.frag", 4))?;
-    GraphicsPipeline::new(device, "overlay", &vertex, &fragment, state)
-}
-
 impl Overlay {
     /// For targets of `format`.
     pub fn new(device: &Arc<Device>, library: &Library, format: vk::Format) -> Result<Self> {
+        let state = GraphicsState { keeps: Keeps::Over, ..GraphicsState::plain(format) };
+        let vertex = library.shader(&ShaderPermutation::new("overlay.vert", 4))?;
+        let fragment = library.shader(&ShaderPermutation::new("overlay.frag", 4))?;
         Ok(Overlay {
             device: device.clone(),
-            pipeline: pipeline(device, library, format)?,
+            pipeline: GraphicsPipeline::new(device, "overlay", &vertex, &fragment, state)?,
             encode: !encodes_srgb(format),
             textures: HashMap::new(),
             retired: Vec::new(),
@@ -86,11 +82,6 @@ impl Overlay {
             size: [0; 2],
             points: [0.0; 2],
         })
-    }
-
-    pub fn reload(&mut self, library: &Library) -> Result<()> {
-        self.pipeline = pipeline(&self.device, library, self.pipeline.state.color)?;
-        Ok(())
     }
 
     /// Applies changes of textures; call it before the frame that needs them is prepared.

@@ -22,7 +22,6 @@ pub(super) const LEAST_TEXT: f32 = 12.0;
 const MARGIN: f32 = 8.0;
 /// Colour of warnings.
 const WARNING: Color32 = Color32::from_rgb(255, 190, 90);
-const ERROR: Color32 = Color32::from_rgb(255, 120, 110);
 /// Width of a folded panel, points.
 const FOLDED_WIDTH: f32 = 104.0;
 /// Width of the unfolded list of keys, points.
@@ -60,7 +59,6 @@ pub struct Status<'s> {
     pub reference: Option<(u32, f64, bool)>,
     /// Error, and whether it is up to date.
     pub error: Option<(ErrorScale, bool)>,
-    pub shader_error: Option<&'s str>,
     /// Messages for the user, oldest first.
     pub messages: Vec<&'s str>,
 }
@@ -178,11 +176,10 @@ fn halves(context: &Context, editor: &Editor) {
     }
 }
 
-/// Draws the notes at the bottom: messages, and unless the overlay is hidden, reference and error, and shader errors.
+/// Draws the notes at the bottom: messages, and unless the overlay is hidden, reference and error.
 fn notes(context: &Context, editor: &Editor, status: &Status<'_>) {
     let mut lines: Vec<(String, Color32)> = Vec::new();
     let shows = editor.overlay;
-    let shader_error = status.shader_error.filter(|_| shows);
     if shows && (editor.reference || editor.error) {
         lines.push(match status.reference {
             Some((rays, error, true)) => (
@@ -215,7 +212,7 @@ fn notes(context: &Context, editor: &Editor, status: &Status<'_>) {
         });
     }
     lines.extend(status.messages.iter().map(|text| ((*text).to_owned(), Color32::WHITE)));
-    if lines.is_empty() && shader_error.is_none() && status.bake.is_none() {
+    if lines.is_empty() && status.bake.is_none() {
         return;
     }
     let screen = context.content_rect();
@@ -231,10 +228,6 @@ fn notes(context: &Context, editor: &Editor, status: &Status<'_>) {
             }
             if let Some((scale, _)) = status.error.filter(|_| shows && editor.error) {
                 bar(ui, scale.limit);
-            }
-            if let Some(error) = shader_error {
-                ui.colored_label(WARNING, "a shader does not compile; the previous one stays in use");
-                ui.label(RichText::new(error.trim()).monospace().color(ERROR));
             }
         })
     });

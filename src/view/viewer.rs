@@ -10,7 +10,6 @@ use super::follow::Pace;
 use super::input::{Event, Input};
 use super::overlay::{Overlay, Paint};
 use super::panel::{self, ErrorScale, Status};
-use super::reload::Watch;
 use super::task::{BackgroundTask, TaskProgress};
 use crate::asset::edges::Edges;
 use crate::bake::Baker;
@@ -109,9 +108,6 @@ pub struct Viewer {
     pub(super) error_shown: Option<(u64, u32, ErrorScale)>,
     /// Counts every change of the light on vertices.
     pub(super) version: u64,
-    pub(super) watch: Option<Watch>,
-    /// The compiler's messages about the last change of a shader file.
-    pub shader_error: Option<String>,
     pub(super) messages: VecDeque<Message>,
     pub(super) timings: VecDeque<Vec<Timing>>,
     pub(super) edges: HashMap<usize, Edges>,
@@ -158,8 +154,6 @@ impl Viewer {
             reference: None,
             error_shown: None,
             version: 0,
-            watch: setup.library.shader_dir.as_deref().map(Watch::new),
-            shader_error: None,
             messages: VecDeque::new(),
             timings: VecDeque::new(),
             edges: HashMap::new(),
@@ -222,8 +216,7 @@ impl Viewer {
 
     /// Time until [`Viewer::update`] should run again; `None` if it can wait for an event.
     pub fn idle(&self) -> Option<Duration> {
-        let busy =
-            self.bake.is_some() || self.rays.as_ref().is_some_and(BackgroundTask::is_running) || self.watch.is_some();
+        let busy = self.bake.is_some() || self.rays.as_ref().is_some_and(BackgroundTask::is_running);
         let poll = (busy || !self.messages.is_empty()).then_some(Duration::from_millis(100));
         let wakes = self.repaint_at.into_iter().chain(self.refine_at);
         let wakes = wakes.map(|at| at.saturating_duration_since(Instant::now()));
@@ -295,10 +288,6 @@ impl Viewer {
             }
         }
         self.preview()?;
-        let files = self.watch.as_mut().and_then(Watch::poll);
-        if let Some(files) = files {
-            self.reload(&files);
-        }
         self.look_at_rays()
     }
 
@@ -388,7 +377,6 @@ impl Viewer {
             rays: self.rays.as_ref().filter(|rays| rays.is_running()).map(BackgroundTask::progress),
             reference: self.reference.as_ref().map(|r| (r.rays, r.error, r.version == self.version)),
             error: self.error_shown.as_ref().map(|(version, _, scale)| (*scale, *version == self.version)),
-            shader_error: self.shader_error.as_deref(),
             messages: self.messages(),
         }
     }

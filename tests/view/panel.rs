@@ -57,7 +57,6 @@ impl Stand {
             rays: Some(progress),
             reference: Some((16, 0.01, true)),
             error: Some((ErrorScale { rms: 0.01, limit: 0.1 }, true)),
-            shader_error: Some("draw.frag:3: error"),
             messages: vec!["wrote scene-edited.toml"],
         };
         self.time_s += 0.5;

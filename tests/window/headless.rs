@@ -9,7 +9,6 @@ use shadow_fields::view::command::Command;
 use shadow_fields::view::input::{Button, Event, Key};
 use shadow_fields::view::{Previewed, Setup, Viewer};
 use std::collections::HashSet;
-use std::path::Path;
 use std::time::Duration;
 
 /// What is shown, which is what `render` makes of the same state.
@@ -233,44 +232,4 @@ fn the_overlay_and_the_reference_are_drawn() {
     assert!(apart(&plain, &error) > 5000, "false colours replace the picture");
     stand.letter('x');
     assert_eq!(apart(&plain, &stand.shown()), 0, "and it is back");
-}
-
-#[test]
-fn changed_shaders_are_rebuilt_and_broken_ones_are_not_used() {
-    let folder = tempfile::tempdir().unwrap();
-    let Some(mut stand) = Stand::with("reload", |setup| setup.library.shader_dir = Some(folder.path().to_owned()))
-    else {
-        return;
-    };
-    stand.ready();
-    let plain = stand.shown();
-    let write = |name: &str, text: &str| std::fs::write(folder.path().join(name), text).unwrap();
-    write("draw.frag", "#version 460\nlayout(location = 0) out vec4 color;\nvoid main() { color = nonsense; }\n");
-    stand.until("the compiler's lines", |viewer| viewer.shader_error.is_some());
-    let error = stand.viewer.shader_error.as_ref().unwrap().to_owned();
-    assert!(error.contains("draw.frag:3") && error.contains("nonsense"), "{error}");
-    assert_eq!(apart(&plain, &stand.shown()), 0, "the pipeline before stays");
-    // The floor is drawn as a grid, by a shader of its own.
-    // Both read what the vertex shader writes: the validation layer asks for that where a device lacks maintenance4.
-    for (file, input) in [("grid.frag", "vec3"), ("draw.frag", "vec4")] {
-        let red = format!(
-            "layout(location = 0) in {input} at;\nvoid main() {{ color = vec4(1, at.x > 1e30 ? 1 : 0, 0, 1); }}\n"
-        );
-        write(file, &format!("#version 460\nlayout(location = 0) out vec4 color;\n{red}"));
-    }
-    stand.until("a good shader", |viewer| viewer.shader_error.is_none());
-    let red = stand.shown().iter().filter(|p| p[0] > 250 && p[1] == 0 && p[2] == 0).count();
-    assert!(red > 10_000, "{red} red pixels");
-    // A file that others include: the entry point itself is as it was.
-    for file in ["draw.frag", "grid.frag"] {
-        std::fs::remove_file(folder.path().join(file)).unwrap();
-        stand.until("the built-in shader", |viewer| viewer.message().is_some_and(|m| m.ends_with(file)));
-    }
-    let cone = std::fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("glsl/merge_layout.glsl")).unwrap();
-    write("merge_layout.glsl", &format!("{cone}\nnonsense\n"));
-    stand.until("the including shader's error", |viewer| viewer.shader_error.is_some());
-    assert!(stand.viewer.shader_error.as_ref().unwrap().contains("merge_layout.glsl"));
-    write("merge_layout.glsl", &cone);
-    stand.until("a good include", |viewer| viewer.shader_error.is_none());
-    assert_eq!(apart(&plain, &stand.shown()), 0);
 }

@@ -45,9 +45,9 @@
 //!   lights, so nothing is baked of it; other flat meshes have fields as all others do. A point within 0.002 bounding
 //!   radii of its receiver from the sheet's plane counts as that far from it, on the side of its receiver's centre
 //!   ([`field::sheet`]).
-//! - Boxes block sharp lights in closed form too ([`field::cuboid`]), and so do solids with square corners, as houses and
-//!   stairs, as overlapping boxes ([`asset::Mesh::boxes`]). A closed surface that lets light through and holds a lamp takes
-//!   its share once of all that leaves it.
+//! - Boxes block sharp lights in closed form too ([`field::cuboid`]), and so do solids with square corners, as houses
+//!   and stairs, as overlapping boxes ([`asset::Mesh::boxes`]). A closed surface that lets light through and holds a
+//!   lamp takes its share once of all that leaves it.
 //! - Bounces: every vertex of a rigid group has links to runs of vertices that it sees, and reads the occlusion fields of
 //!   what moves around it for the light that comes from there ([`bounce`]); boxes that move hide links. All that reflects
 //!   passes its base colour's share of light on as a diffuse surface does, metals too.

@@ -6,6 +6,7 @@
 //! share of a light.
 
 use super::mesh::Mesh;
+use super::outline::{SQUARE, square_axes};
 use crate::field::cuboid::{Cuboid, PlacedCuboid};
 use glam::{DMat3, DVec2, DVec3};
 
@@ -14,8 +15,6 @@ const TRIANGLES_LIMIT: usize = 4096;
 const PLANES_LIMIT: usize = 64;
 const CELLS_LIMIT: usize = 8192;
 const BOXES_LIMIT: usize = 48;
-/// By how much the cosine of the angle between a face and an axis may differ from 0 or 1.
-const SQUARE: f64 = 1e-4;
 /// Planes that are closer are one, in bounding radii.
 const SAME: f64 = 1e-5;
 /// Where in a cell it is tested, so that no diagonal of a face passes there.
@@ -50,10 +49,8 @@ impl Cells {
             let [a, b, c] = corners(t);
             (b - a).cross(c - a).try_normalize()
         };
-        let normals = || mesh.triangles.iter().filter_map(normal);
-        let x = normals().next()?;
-        let y = normals().find(|normal| normal.dot(x).abs() < SQUARE)?.reject_from_normalized(x).normalize();
-        let axes = DMat3::from_cols(x, y, x.cross(y));
+        let [x, y, z] = square_axes(mesh.triangles.iter().filter_map(normal))?;
+        let axes = DMat3::from_cols(x, y, z);
         // Along which axis each face looks, its place there, and which way.
         let mut faces: [Vec<(f64, f64, [DVec2; 3])>; 3] = Default::default();
         for triangle in &mesh.triangles {

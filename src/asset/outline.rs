@@ -42,7 +42,18 @@ pub(super) fn rectangle(mesh: &Mesh) -> Option<Rectangle> {
 }
 
 /// By how much the cosine of the angle between a box's face and its edges may differ from 0 or 1.
-const SQUARE: f64 = 1e-4;
+pub(super) const SQUARE: f64 = 1e-4;
+
+/// The axes along which a solid's faces look, if its corners are square: those of its first face and of the first one at
+/// a right angle to that.
+pub(super) fn square_axes(mut normals: impl Iterator<Item = DVec3> + Clone) -> Option<[DVec3; 3]> {
+    let x = normals.clone().next()?;
+    let y = normals.clone().find(|normal| normal.dot(x).abs() < SQUARE)?;
+    let y = (y - y.dot(x) * x).normalize();
+    let axes = [x, y, x.cross(y)];
+    let is_face = |normal: DVec3| axes.iter().any(|axis| axis.dot(normal).abs() > 1.0 - SQUARE);
+    normals.all(is_face).then_some(axes)
+}
 
 /// The box that a convex mesh is, if it is one: however it is turned and its faces are cut.
 pub(super) fn cuboid(mesh: &Mesh) -> Option<Cuboid> {
@@ -55,19 +66,14 @@ pub(super) fn cuboid(mesh: &Mesh) -> Option<Cuboid> {
     if !mesh.is_convex() {
         return None;
     }
-    let x = mesh.triangles.iter().find_map(normal)?;
-    let y = mesh.triangles.iter().filter_map(normal).find(|normal| normal.dot(x).abs() < SQUARE)?;
-    let y = (y - y.dot(x) * x).normalize();
-    let axes = [x, y, x.cross(y)];
-    let is_face = |normal: DVec3| axes.iter().any(|axis| axis.dot(normal).abs() > 1.0 - SQUARE);
+    let axes = square_axes(mesh.triangles.iter().filter_map(normal))?;
     let reach = |axis: &DVec3| {
         let along = || (0..mesh.positions.len() as u32).map(|v| axis.dot(place(v)));
         [along().fold(f64::MAX, f64::min), along().fold(f64::MIN, f64::max)]
     };
     let ends = axes.each_ref().map(reach);
     let in_middle = ends.iter().all(|[low, high]| (low + high).abs() < SQUARE);
-    (in_middle && mesh.triangles.iter().filter_map(normal).all(is_face))
-        .then(|| Cuboid { half_edges: std::array::from_fn(|i| 0.5 * (ends[i][1] - ends[i][0]) * axes[i]) })
+    in_middle.then(|| Cuboid { half_edges: std::array::from_fn(|i| 0.5 * (ends[i][1] - ends[i][0]) * axes[i]) })
 }
 
 #[cfg(test)]

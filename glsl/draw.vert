@@ -1,4 +1,5 @@
 #version 460
+#extension GL_EXT_control_flow_attributes : require
 // Draws a lit vertex: emission plus radiosity, both as radiance in linear Rec.709.
 layout(location = 0) in vec3 position;
 layout(location = 1) in vec3 emission;

@@ -8,7 +8,7 @@ layout(location = 7) centroid in vec3 normal; // world
 layout(location = 8) centroid in vec4 first;    // glsl/gloss.comp
 layout(location = 9) centroid in vec3 second;
 #if HIGHLIGHTS
-layout(location = 10) centroid in vec4 shares;
+layout(location = 10) centroid in vec4 shares[SHOWN_QUADS];
 #endif
 #define MAP_BINDING GLOSS_BINDING + 3
 #define TABLE_BINDING GLOSS_BINDING + 4
@@ -24,7 +24,16 @@ layout(location = 10) centroid in vec4 shares;
 #if HIGHLIGHTS
 // One of the lights that highlights are of; any where there are fewer, which has no share.
 Entity highlight_light(GlossEntity entity, uint i) {
-    return ENTITY(entity.lights[i] == NONE ? 0 : entity.lights[i]);
+    uint pair = (i < 8 ? entity.lights : entity.more_lights)[i / 2 % 4];
+    return ENTITY(pair >> 16 * (i % 2) & 0xffff);
+}
+
+// How much of it arrives: of the first four `share`, of the others as vertices have it.
+float share_of(vec4 share, float within, uint i) {
+    [[unroll]] for (uint q = 1; q < SHOWN_QUADS; q++) {
+        share = i / 4 == q ? within * shares[q] : share;
+    }
+    return share[i % 4];
 }
 #endif
 
@@ -51,7 +60,7 @@ vec3 mapped_normal(vec3 n, vec3 place, vec2 uv, float slope) {
 
 // Light that a surface which faces along `n` would have if as much were blocked for it as for its vertices, and by the
 // surface itself, whose own normal is `ground`.
-vec3 open_light(GlossEntity entity, vec3 n, vec3 ground, vec3 place, vec3 bounced, vec4 share) {
+vec3 open_light(GlossEntity entity, vec3 n, vec3 ground, vec3 place, vec3 bounced, vec4 share, float within) {
     // Of the roughest lobe the map holds what a diffuse surface sees.
     vec3 sum = (0.5 + 0.5 * dot(n, ground)) * (bounced + entity.sky_scale * sky_at(n, LEVELS - 1.0));
 #if HIGHLIGHTS
@@ -62,7 +71,7 @@ vec3 open_light(GlossEntity entity, vec3 n, vec3 ground, vec3 place, vec3 bounce
         vec3 along = along_axes(light, vec2(0.0));
         float facing = dot(mat3(light.toward, light.across, light.down) * along, n);
         float unit = part_light(light, Block(vec2(0.0), 0.0, 1.0, 1.0), vec2(0.0), along);
-        sum += share[i] * unit * max(facing, 0.0) / PI * shining.emission;
+        sum += share_of(share, within, i) * unit * max(facing, 0.0) / PI * shining.emission;
         i++;
     } while (i < entity.light_count);
 #endif
@@ -73,14 +82,14 @@ vec3 open_light(GlossEntity entity, vec3 n, vec3 ground, vec3 place, vec3 bounce
 // Shares of the lights that highlights are of, as vertices have them.
 vec4 vertex_shares(float within) {
 #if HIGHLIGHTS
-    return within * shares;
+    return within * shares[0];
 #else
     return vec4(0.0);
 #endif
 }
 
-// Radiance of a pixel without emission. `light` is that of a diffuse surface of colour `base`, `share` of each light that
-// highlights are of how much arrives; `within` is that of within_triangle.
+// Radiance of a pixel without emission. `light` is that of a diffuse surface of colour `base`, `share` of the first four
+// lights that highlights are of how much arrives; `within` is that of within_triangle.
 vec3 glossy(uint index, vec3 base, vec3 light, vec4 share, vec2 uv, float within) {
     GlossEntity entity = gloss_entity_at(index);
     vec3 n = normalize(normal);
@@ -91,8 +100,8 @@ vec3 glossy(uint index, vec3 base, vec3 light, vec4 share, vec2 uv, float within
     roughness = clamp(entity.factors.x * of_gloss.g, 0.0, 1.0);
     metallic = clamp(entity.factors.y * of_gloss.b, 0.0, 1.0);
     vec3 mapped = mapped_normal(n, from_eye, uv, entity.factors.z);
-    vec3 smooth_light = open_light(entity, n, n, from_eye, found.grazing, share);
-    vec3 mapped_light = open_light(entity, mapped, n, from_eye, found.grazing, share);
+    vec3 smooth_light = open_light(entity, n, n, from_eye, found.grazing, share, within);
+    vec3 mapped_light = open_light(entity, mapped, n, from_eye, found.grazing, share, within);
     light *= clamp(mapped_light / max(smooth_light, vec3(1e-20)), vec3(0.0), vec3(MOST_TILTED));
     View view = view_of(from_eye, mapped, roughness);
     view.ground = n;
@@ -154,12 +163,12 @@ vec3 glossy(uint index, vec3 base, vec3 light, vec4 share, vec2 uv, float within
             Entity shining = highlight_light(entity, i);
             vec3 to = shining.centre.xyz - entity.eye - from_eye;
             float most = most_light(view, to, shining, max(f0.x, max(f0.y, f0.z)));
-            faint = share[i] * most * dot(shining.emission, vec3(1.0)) <= least;
+            faint = share_of(share, within, i) * most * dot(shining.emission, vec3(1.0)) <= least;
             i += faint ? 1 : 0;
         } while (faint && i < entity.light_count);
         if (i < entity.light_count) {
             Entity shining = highlight_light(entity, i);
-            vec2 part = share[i] * reflect_light(view, shining.centre.xyz - entity.eye - from_eye, shining);
+            vec2 part = share_of(share, within, i) * reflect_light(view, shining.centre.xyz - entity.eye - from_eye, shining);
             found.facing += part.x * shining.emission;
             found.grazing += part.y * shining.emission;
             i++;

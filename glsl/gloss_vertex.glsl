@@ -4,13 +4,13 @@ layout(binding = GLOSS_BINDING) uniform textureBuffer gloss_entities;
 #include "generated/gloss_structs.glsl"
 #include "generated/gloss_entity_at.glsl"
 layout(binding = GLOSS_BINDING + 1) uniform textureBuffer reflected;    // two of every vertex: glsl/gloss.comp
-layout(binding = GLOSS_BINDING + 2) uniform textureBuffer shown_shares; // of the lights that highlights are of
+layout(binding = GLOSS_BINDING + 2) uniform utextureBuffer shown_shares; // of the lights that highlights are of
 layout(location = 6) out vec3 from_eye; // world axes, metres
 layout(location = 7) out vec3 normal;   // world
 layout(location = 8) out vec4 first;   // glsl/gloss.comp
 layout(location = 9) out vec3 second;
 #if HIGHLIGHTS
-layout(location = 10) out vec4 shares;
+layout(location = 10) out vec4 shares[SHOWN_QUADS];
 #endif
 
 void pass_gloss(uint index, uint v) {
@@ -23,6 +23,9 @@ void pass_gloss(uint index, uint v) {
     first = texelFetch(reflected, 2 * lit);
     second = texelFetch(reflected, 2 * lit + 1).rgb;
 #if HIGHLIGHTS
-    shares = texelFetch(shown_shares, lit);
+    uvec4 bytes = texelFetch(shown_shares, lit);
+    [[unroll]] for (uint q = 0; q < SHOWN_QUADS; q++) {
+        shares[q] = unpackUnorm4x8(bytes[q]);
+    }
 #endif
 }

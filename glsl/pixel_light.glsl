@@ -21,15 +21,16 @@ uvec2 self_cell(uint i) {
 #include "self_visibility.glsl"
 #endif
 #define BLENDS 1
+#define SHOWN_QUADS 1 // of further lights vertices have the shares
 layout(binding = 14) uniform textureBuffer irradiances; // of all vertices by one light after another
 uvec3 lit_vertices; // of the pixel's triangle, among all
 vec3 vertex_weights;
 #include "sharp_light.glsl"
 #if SHOWN
 layout(binding = 9) uniform utextureBuffer shown_lights_of; // of every entity
-layout(binding = 15) uniform textureBuffer shown_shares_of; // of every vertex
+layout(binding = 15) uniform utextureBuffer shown_shares_of; // of every vertex
 vec4 shares_at(uint vertex) {
-    return texelFetch(shown_shares_of, int(vertex));
+    return unpackUnorm4x8(texelFetch(shown_shares_of, int(vertex)).x);
 }
 #endif
 #include "screen_light.glsl"
@@ -58,11 +59,12 @@ uvec4 pixel_light(Entity receiver, vec3 at, Facing facings[FACINGS], uvec2 chain
     surface.facings = facings;
     surface.step = receiver.scale * max(length(dFdx(at)), length(dFdy(at)));
 #if SHOWN
-    shown_lights = texelFetch(shown_lights_of, int(push.receiver));
-    shown_shares = vertex_weights.x * shares_at(lit_vertices.x) + vertex_weights.y * shares_at(lit_vertices.y)
+    shown_lights[0] = texelFetch(shown_lights_of, int(ALL_SHOWN_QUADS * push.receiver));
+    vec4 by_vertices = vertex_weights.x * shares_at(lit_vertices.x) + vertex_weights.y * shares_at(lit_vertices.y)
                  + vertex_weights.z * shares_at(lit_vertices.z);
+    shown_shares[0] = by_vertices;
 #else
-    const vec4 shown_shares = vec4(0.0);
+    const vec4 shown_shares[] = vec4[](vec4(0.0));
 #endif
     vec3 light, rest;
     if (chain.y > 0) {
@@ -71,5 +73,5 @@ uvec4 pixel_light(Entity receiver, vec3 at, Facing facings[FACINGS], uvec2 chain
     } else {
         light = rest = blend(radiosity, lit_vertices, vertex_weights);
     }
-    return pack_light(push.receiver, gl_FragCoord.z, light, shown_shares, missed > tolerable_miss(receiver.albedo, rest));
+    return pack_light(push.receiver, gl_FragCoord.z, light, shown_shares[0], missed > tolerable_miss(receiver.albedo, rest));
 }

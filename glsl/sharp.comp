@@ -34,8 +34,8 @@ uint kept_vertex; // the place among a light's irradiances of the vertex that is
 #endif
 #include "sharp_light.glsl"
 #if SHOWN
-layout(std430, binding = 9) readonly buffer ShownLights { uvec4 shown_lights_of[]; }; // of every entity
-layout(std430, binding = 10) writeonly buffer ShownShares { vec4 shown_shares_of[]; }; // of every vertex
+layout(std430, binding = 9) readonly buffer ShownLights { uvec4 shown_lights_of[]; }; // ALL_SHOWN_QUADS of every entity
+layout(std430, binding = 10) writeonly buffer ShownShares { uvec4 shown_shares_of[]; }; // of every vertex: bytes
 #endif
 #if LAMPS
 layout(std430, binding = 11) writeonly buffer LampShares { float lamp_shares[]; };
@@ -68,7 +68,10 @@ void main() {
     }
 #endif
 #if SHOWN
-    shown_lights = shown_lights_of[cluster.receiver];
+    EACH for (uint q = 0; q < SHOWN_QUADS; q++) {
+        shown_lights[q] = shown_lights_of[ALL_SHOWN_QUADS * cluster.receiver + q];
+        shown_shares[q] = vec4(0.0);
+    }
 #endif
     if (cluster.sharp_count > 0) {
         sum.rgb += sharp_sum(surface, cluster.entry_first, cluster.sharp_count) * receiver.albedo;
@@ -83,6 +86,10 @@ void main() {
     lamp_shares[cluster.radiosity_first + v] = min(lamps, 1.0);
 #endif
 #if SHOWN
-    shown_shares_of[cluster.radiosity_first + v] = shown_shares;
+    uvec4 bytes = uvec4(0);
+    EACH for (uint q = 0; q < SHOWN_QUADS; q++) {
+        bytes[q] = packUnorm4x8(shown_shares[q]);
+    }
+    shown_shares_of[cluster.radiosity_first + v] = bytes;
 #endif
 }

@@ -38,11 +38,14 @@ float open_share; // irradiance by the current light's parts with nothing betwee
 
 #if SHOWN
 // Shares of the lights that the receiver's highlights are of: how much of each arrives of what an open place would have.
-uvec4 shown_lights; // entities, or NONE
-vec4 shown_shares = vec4(0.0);
+uvec4 shown_lights[SHOWN_QUADS]; // entities, or NONE
+vec4 shown_shares[SHOWN_QUADS];
 
 void note_share(uint light, float irradiance) {
-    shown_shares = mix(shown_shares, vec4(irradiance / max(open_share, 1e-30)), equal(shown_lights, uvec4(light)));
+    vec4 share = vec4(irradiance / max(open_share, 1e-30));
+    EACH for (uint q = 0; q < SHOWN_QUADS; q++) {
+        shown_shares[q] = mix(shown_shares[q], share, equal(shown_lights[q], uvec4(light)));
+    }
 }
 #endif
 

@@ -141,8 +141,8 @@ shared_struct! {
     }
 }
 
-/// Lights whose highlights an entity shows: more than a pixel is worth.
-pub const SHOWN_LIGHTS: usize = 4;
+/// Lights whose highlights an entity shows, strongest first. Pixels find the shares of the first four.
+pub const SHOWN_LIGHTS: usize = 16;
 
 shared_struct! {
     /// A glossy entity as the eye sees it: `GlossEntity` of the shaders.
@@ -157,8 +157,9 @@ shared_struct! {
         /// Place of the eye in the world.
         eye: [f32; 3],
         metallic: f32,
-        /// Entities whose highlights it shows, or [`NONE`].
-        lights: [u32; SHOWN_LIGHTS],
+        /// Entities whose highlights it shows, two in a word and the first in its low half; 0 where there are fewer.
+        lights: [u32; 4],
+        more_lights: [u32; 4],
         /// Reflectance of a dielectric that is faced.
         f0: f32,
         /// Radiance that 1 in the sky's map stands for.

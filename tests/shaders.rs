@@ -88,6 +88,7 @@ fn sharp_way(bits: u32) -> SharpPermutation {
         cuboids: on(1) != on(2),
         globes: on(3),
         gloss: on(0),
+        many_shown: on(0) && on(1),
         lamps: on(0),
         self_shadows: on(4),
         edges: on(0) == on(2),
@@ -104,7 +105,7 @@ fn drawing() -> Vec<ShaderPermutation> {
     let sharp = [0, 0b10_0110].map(|bits| {
         let all = bits > 0;
         let way = SharpPermutation { reads: Reads::Texels, panels: all, cuboids: all, globes: all, ..sharp_way(bits) };
-        SharpPermutation { gloss: all, lamps: false, self_shadows: true, edges: true, ..way }
+        SharpPermutation { gloss: all, many_shown: all, lamps: false, self_shadows: true, edges: true, ..way }
     });
     let ways = [None, Some(&sharp[0]), Some(&sharp[1])];
     let grids = [false, true].map(DrawGrid::rows).concat();

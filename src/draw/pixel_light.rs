@@ -362,7 +362,7 @@ impl LightImages {
         }
         binds.push(Bind::Image(&self.coarse.light));
         binds.push(texel(light.irradiances, vk::Format::R32_SFLOAT)?);
-        binds.push(light.shown.map_or(Ok(Bind::None), |[_, shares]| texel(shares, QUAD_FORMAT))?);
+        binds.push(light.shown.map_or(Ok(Bind::None), |[_, shares]| texel(shares, grid::QUADS))?);
         Ok(binds)
     }
 }

@@ -155,6 +155,7 @@ impl Look<'_> {
             .define("GLOSS", true)
             .define("GLOSS_BINDING", GLOSS_BINDING)
             .define("HIGHLIGHTS", highlights.is_some())
+            .define("SHOWN_QUADS", highlights.map_or(1, SharpPermutation::shown_quads))
             .define("MIRROR", detail != Detail::Rough)
             .define("MIRRORED", mirrored != Mirrored::Nothing && detail != Detail::Rough)
             .define("PROBES", mirrored == Mirrored::PlanesAndProbes)

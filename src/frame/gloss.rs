@@ -110,6 +110,11 @@ impl Frame {
             let factor = self.scene.data.entities[index].gloss.unwrap_or(gloss);
             let mut matrix = world_from_centred(&placements[index], self.buffers.meshes[entity.mesh].centre_m);
             matrix.w_axis -= eye.as_dvec3().extend(0.0);
+            let pair = |k: usize| {
+                let [low, high] = [0, 1].map(|of| glossy.lights[2 * k + of]);
+                let held = |light: u32| if light == NONE { 0 } else { light };
+                held(low) | held(high) << 16
+            };
             let row = |row: usize| matrix.row(row).as_vec4().to_array();
             entities[index] = GlossEntity {
                 row_x: row(0),
@@ -119,7 +124,8 @@ impl Frame {
                 roughness: gloss.roughness,
                 eye: eye.to_array(),
                 metallic: gloss.metallic,
-                lights: glossy.lights,
+                lights: std::array::from_fn(pair),
+                more_lights: std::array::from_fn(|k| pair(4 + k)),
                 f0: gloss.f0,
                 sky_scale: reflections.sky_scale(),
                 vertex_first: self.buffers.surface(index).vertices.start,

@@ -58,6 +58,7 @@ pub(super) fn sharp(
         cuboids: (0..scene.entities.len()).any(|entity| scene.casts_as_box(entity) || scene.casts_as_boxes(entity)),
         globes: (0..scene.entities.len()).any(|entity| scene.is_globe(entity)),
         gloss: merge.gloss,
+        many_shown: merge.gloss && lights.len() > 4,
         self_shadows: buffers.has_self_shadows(),
         edges: false,
         lamps: false,

@@ -275,7 +275,7 @@ impl<'b> DrawnReflections<'b> {
         Ok(vec![
             texels(&*of.entities)?,
             texels(&of.reflected)?,
-            texels(&of.shown_shares)?,
+            Bind::Texel(TexelView::new(&of.shown_shares, vk::Format::R32G32B32A32_UINT)?),
             Bind::Texture(&of.sky.map),
             Bind::Texture(&of.lobes),
         ])

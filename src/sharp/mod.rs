@@ -17,7 +17,7 @@ use crate::field::silhouette::{DEEP, HALF_DEPTH, INSIDE, REACH};
 use crate::field::silhouette_nodes::{BEYOND, EASED, LEAST_AHEAD};
 use crate::field::sub_light::{BLEND, CORNER, LIMIT_SINE, MOST_SINE, NEAR_LIGHT_STEPS, STRIP, THIN, TURNED_BY};
 use crate::gpu::{Bind, Buffer, Commands, ComputePipeline, Device, TexelView};
-use crate::layout::{CLUSTER_FORMAT, CLUSTER_VERTICES, ENTRY_BITS, ENTRY_FORMAT};
+use crate::layout::{CLUSTER_FORMAT, CLUSTER_VERTICES, ENTRY_BITS, ENTRY_FORMAT, SHOWN_LIGHTS};
 use crate::merge::variant::Reads;
 use crate::shaders::{Library, ShaderPermutation};
 use ash::vk;
@@ -80,6 +80,8 @@ pub struct SharpPermutation {
     pub self_shadows: bool,
     /// Whether the shares of lights whose highlights are shown are kept.
     pub gloss: bool,
+    /// Whether there are more of them than four.
+    pub many_shown: bool,
     /// Whether the share of its view that lamps take is kept of every vertex, for bounces.
     pub lamps: bool,
     /// Whether vertices that a shadow's edge comes near are marked, and their irradiance by each light is kept, for pixels
@@ -92,7 +94,13 @@ pub struct SharpPermutation {
 
 impl SharpPermutation {
     pub fn row(&self) -> ShaderPermutation {
-        self.shared(ShaderPermutation::new("sharp.comp", 4)).number("EDGE_REACH", EDGE_REACH)
+        let row = self.shared(ShaderPermutation::new("sharp.comp", 4));
+        row.define("SHOWN_QUADS", self.shown_quads()).number("EDGE_REACH", EDGE_REACH)
+    }
+
+    /// Fours of lights that highlights are of.
+    pub fn shown_quads(&self) -> u32 {
+        if self.many_shown { SHOWN_LIGHTS as u32 / 4 } else { 1 }
     }
 
     /// A fragment shader that evaluates sharp lights. It reads everything through texel views.
@@ -130,6 +138,7 @@ impl SharpPermutation {
             .define("SELF", self.self_shadows)
             .define("EDGES", self.edges)
             .define("SHOWN", self.gloss)
+            .define("ALL_SHOWN_QUADS", SHOWN_LIGHTS as u32 / 4)
             .define("LAMPS", self.lamps)
             .define("ROLLED", self.rolled)
             .define("NODE_CELLS", self.silhouette.cells)

@@ -175,7 +175,8 @@ vec3 glossy(uint index, vec3 base, vec3 light, vec4 share, vec2 uv, float within
         }
     } while (i < entity.light_count);
 #endif
-    vec3 specular = f0 * found.facing + found.grazing;
+    // A back shows the diffuse light of its front alone.
+    vec3 specular = gl_FrontFacing ? f0 * found.facing + found.grazing : vec3(0.0);
     // Light that microfacets pass on to each other: Kulla and Conty, Revisiting Physically Based Shading at Imageworks,
     // SIGGRAPH 2017 course, as a factor.
     vec3 again = f0 * entity.mean_energy / max(1.0 - f0 * (1.0 - entity.mean_energy), 1e-6);

@@ -43,9 +43,11 @@ impl Reflection {
         Reflection { base, lobe, ground: None }
     }
 
-    /// The same on a surface whose own normal is another.
-    pub fn on(self, ground: DVec3) -> Self {
-        Reflection { ground: Some(ground), ..self }
+    /// The same on a surface whose own normal is another. Seen from behind it shows its front's diffuse light alone.
+    pub fn on(self, ground: DVec3, toward: DVec3) -> Self {
+        let again = |lobe: MicrofacetLobe| if ground.dot(toward) < 0.0 { DVec3::ZERO } else { lobe.again };
+        let lobe = self.lobe.map(|lobe| MicrofacetLobe { again: again(lobe), ..lobe });
+        Reflection { base: self.base, lobe, ground: Some(ground) }
     }
 
     /// Whether the surface itself does not hide a direction.

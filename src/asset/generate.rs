@@ -299,3 +299,24 @@ pub fn cuboid(size_m: Vec3, cells: u32) -> Mesh {
     }
     finish("cuboid", positions, normals, None, triangles)
 }
+
+/// An open tube of `sides` around places.
+#[cfg(test)]
+pub fn tube(places: &[Vec3], radius_m: f32, sides: u32) -> Mesh {
+    let mut positions = Vec::new();
+    let mut triangles = Vec::new();
+    for (k, place) in places.iter().enumerate() {
+        let along = places[(k + 1).min(places.len() - 1)] - places[k.max(1) - 1];
+        let across = along.any_orthogonal_vector().normalize();
+        let down = along.cross(across).normalize();
+        positions.extend((0..sides).map(|i| {
+            let (sin, cos) = (std::f32::consts::TAU * i as f32 / sides as f32).sin_cos();
+            *place + radius_m * (cos * across + sin * down)
+        }));
+        for i in (0..sides).filter(|_| k > 0) {
+            let [a, b] = [i, (i + 1) % sides].map(|i| (k as u32 - 1) * sides + i);
+            triangles.extend([[a, b, b + sides], [a, b + sides, a + sides]]);
+        }
+    }
+    Mesh::new("tube", positions, Vec::new(), None, triangles).expect("a tube has an area")
+}

@@ -2,7 +2,7 @@
 
 use glam::{DVec3, Vec2, Vec3};
 
-use super::{boxes, enclose, outline, topology};
+use super::{bars, boxes, enclose, outline, topology};
 use crate::error::{Error, Result};
 use crate::field::cuboid::{Cuboid, PlacedCuboid};
 use crate::field::sheet::Rectangle;
@@ -164,6 +164,9 @@ impl Mesh {
         mesh.rectangle = outline::rectangle(&mesh);
         mesh.cuboid = outline::cuboid(&mesh);
         mesh.boxes = boxes::boxes(&mesh);
+        if mesh.boxes.is_empty() {
+            mesh.boxes = bars::bars(&mesh);
+        }
         if mesh.colors.is_none() {
             mesh.panel = mesh.rectangle.map_or_else(|| mesh.tube(), |rectangle| rectangle.as_lamp());
         }
@@ -355,9 +358,17 @@ impl Mesh {
         self.cuboid
     }
 
-    /// Boxes that overlap and together are the mesh, if it is a solid with square corners and no box itself.
+    /// Boxes that overlap and together are the mesh, if it is a solid with square corners and no box itself, or consists
+    /// of thin bars.
     pub fn boxes(&self) -> &[PlacedCuboid] {
         &self.boxes
+    }
+
+    /// The same, with the box that it is itself.
+    pub(super) fn as_boxes(&self) -> Vec<PlacedCuboid> {
+        let placed =
+            |cuboid| PlacedCuboid { centre_m: self.centre.as_dvec3(), radius_m: f64::from(self.radius_m), cuboid };
+        self.cuboid.map_or_else(|| self.boxes.clone(), |cuboid| vec![placed(cuboid)])
     }
 
     pub(super) fn with_panel(self, panel: LampFace) -> Self {

@@ -237,6 +237,19 @@ pub fn piece_numbers(positions: &[Vec3], triangles: &[[u32; 3]]) -> Vec<u32> {
     (0..triangles.len()).map(&mut number).collect()
 }
 
+/// A few of many triangles, by their numbers.
+pub fn subset(triangles: &[[u32; 3]], piece: &[u32]) -> Vec<[u32; 3]> {
+    piece.iter().map(|triangle| triangles[*triangle as usize]).collect()
+}
+
+/// The pieces that hang together: the numbers of their triangles.
+pub fn loose(positions: &[Vec3], triangles: &[[u32; 3]]) -> Vec<Vec<u32>> {
+    let numbers = piece_numbers(positions, triangles);
+    let mut pieces = vec![Vec::new(); numbers.iter().max().map_or(0, |last| *last as usize + 1)];
+    (0..).zip(numbers).for_each(|(triangle, number)| pieces[number as usize].push(triangle));
+    pieces
+}
+
 /// Whether every piece of a closed surface is wound outwards, so that none is the wall of a cavity or inside out.
 fn has_solid_pieces(edges: &[&[HalfEdge]], positions: &[Vec3], triangles: &[[u32; 3]], centre: Vec3) -> bool {
     let mut pieces = pieces(edges, triangles.len());

@@ -326,7 +326,7 @@ pub struct MeshData {
     pub file: Option<PathBuf>,
     /// Mesh and primitive of a glTF file, counted from 0.
     pub part: Option<[usize; 2]>,
-    /// One of the pieces of the part, counted from 0: loose convex solids of few triangles, walls of rooms, and last the
+    /// One of the pieces of the part, counted from 0: loose solids, thin bars together, walls of rooms, and last the
     /// rest; of what glows, lamps that stand apart. The default takes all.
     pub piece: Option<u32>,
     /// Columns of a matrix that scales, mirrors or shears the part. The default leaves it as it is.

@@ -116,7 +116,21 @@ fn rooms_are_cut_into_their_walls() {
     assert_eq!(meshes(&[(&open, Vec3::ZERO)], json!({})).len(), 1);
     let ring = generate::torus(0.4, 0.1, 24, 12);
     let both = meshes(&[(&inside_out(&solid), Vec3::ZERO), (&ring, 9.0 * Vec3::X)], json!({}));
-    assert_eq!(both.len(), 1, "a box that may be inside out");
+    assert_eq!(both.len(), 2, "a box that may be inside out is a solid");
+    assert!(both.iter().all(|mesh| mesh.rectangle().is_none()));
+}
+
+/// A ring, a ball and bars of one mesh: solids are apart, bars are together.
+#[test]
+fn solids_are_cut_off_and_bars_stay_together() {
+    let ring = generate::torus(0.4, 0.1, 24, 12);
+    let ball = generate::sphere(0.3, 3);
+    let bar = generate::cuboid(Vec3::new(2.0, 0.03, 0.03), 1);
+    let bars = (0..5).map(|i| (&bar, Vec3::new(0.0, 0.2 * i as f32, 2.0)));
+    let parts: Vec<(&Mesh, Vec3)> = [(&ring, 3.0 * Vec3::X), (&ball, 5.0 * Vec3::X)].into_iter().chain(bars).collect();
+    let found = meshes(&parts, json!({}));
+    assert_eq!(found.len(), 3);
+    assert_eq!(found.iter().map(|mesh| mesh.boxes().len()).collect::<Vec<_>>(), [0, 0, 5]);
 }
 
 #[test]

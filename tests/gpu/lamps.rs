@@ -221,6 +221,31 @@ fn a_house_of_one_mesh_has_a_patch_of_sunlight() {
     assert!(error < 0.09, "{error}");
 }
 
+/// Rods of one mesh have shadows as wide as they are: maps of 32 texels across all of them leave dots (0.069).
+#[test]
+fn thin_bars_of_one_mesh_cast_whole_shadows() {
+    let Some(gpu) = gpu() else { return };
+    let rod = |x: f32, lean: f32| {
+        let place = move |i: u32, end: f32| {
+            let (sin, cos) = (std::f32::consts::TAU * i as f32 / 8.0).sin_cos();
+            Vec3::new(x + lean * end + 0.03 * cos, 2.0 * end, 0.03 * sin)
+        };
+        (0..8).flat_map(move |i| [place(i, 0.0), place(i, 1.0), place(i + 1, 1.0), place(i + 1, 0.0)])
+    };
+    let rods = (0..6).flat_map(|k| rod(0.4 * k as f32 - 1.0, 0.1 * k as f32 - 0.2));
+    let sky = r#"uniform = [0.2, 0.2, 0.2]
+sun = { toward = [0.5, 0.8, -0.4], angle_deg = 1, radiance = [6000, 6000, 6000] }"#;
+    let scene = Scene::builder()
+        .camera(Camera::new([-0.6, 1.4, 2.6], [-0.6, 0.0, 0.6]))
+        .environment(toml::from_str(sky).unwrap())
+        .mesh("rods", of_quads("rods", rods.collect()))
+        .mesh("ground", generate::plane(8.0, 32))
+        .entity(EntityData::of_mesh("rods"))
+        .entity(EntityData::of_mesh("ground"));
+    let error = picture_error(&gpu, &scene.build().unwrap());
+    assert!(error < 0.045, "{error}");
+}
+
 /// A vault of one sheet ends in a wall that is higher: below the vault no sun comes in along the line where they meet
 /// (0.55).
 #[test]

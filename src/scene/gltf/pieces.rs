@@ -5,14 +5,13 @@ use std::collections::HashSet;
 use glam::{Mat3, Vec3};
 
 use super::join::{Candidate, halve};
+use crate::asset::Mesh;
+use crate::asset::bars::{self, BARS_LIMIT};
 use crate::asset::mesh::area_m2;
-use crate::asset::{Mesh, topology};
+use crate::asset::topology::{self, loose, subset};
 
 /// Most solids that a primitive is cut into.
 const SOLIDS_LIMIT: usize = 256;
-/// Most triangles of a solid that is cut off. Such a convex one has a closed form; others are as well off together, and
-/// each would take a second to bake.
-const SOLID_TRIANGLES: usize = 64;
 /// A solid of less than this share of the area stays with the rest.
 const SMALL_SOLID: f64 = 1e-3;
 
@@ -40,17 +39,36 @@ const HALVINGS: u32 = 4;
 /// Pieces of a surface: the numbers of their triangles.
 type Pieces = Vec<Vec<u32>>;
 
-/// The number of the piece that each triangle belongs to: convex solids, whose outlines hold up to where they touch, the
-/// walls of rooms, and last the rest. All are 0 where there are no pieces, or too many.
+/// The number of the piece that each triangle belongs to: bars together, whose shadows are in closed form, solids, whose
+/// outlines hold up to where they touch, the walls of rooms, and last the rest. All are 0 where there are no pieces.
 pub fn solids(positions: &[Vec3], triangles: &[[u32; 3]]) -> Vec<u32> {
-    let pieces = loose(positions, triangles);
-    let area = |piece: &[u32]| area_m2(positions, &of(triangles, piece));
+    let area = |piece: &[u32]| area_m2(positions, &subset(triangles, piece));
     let whole = area_m2(positions, triangles);
-    let (mut cut_off, mut rest): (Pieces, Pieces) = pieces.into_iter().partition(|piece| {
-        (4..=SOLID_TRIANGLES).contains(&piece.len())
-            && area(piece) >= SMALL_SOLID * whole
-            && topology::is_convex(positions, &of(triangles, piece))
-    });
+    let is_solid = |piece: &Vec<u32>| {
+        area(piece) >= SMALL_SOLID * whole && topology::is_closed_either_way(positions, &subset(triangles, piece))
+    };
+    let mut bars = Pieces::new();
+    let mut room = 0;
+    let mut others = Pieces::new();
+    for piece in loose(positions, triangles) {
+        match bars::bar(positions, &subset(triangles, &piece)) {
+            Some(boxes) if boxes.len() <= BARS_LIMIT => {
+                if boxes.len() > room {
+                    bars.push(Vec::new());
+                    room = BARS_LIMIT;
+                }
+                room -= boxes.len();
+                bars.last_mut().expect("the first piece finds no room").extend(piece);
+            }
+            _ => others.push(piece),
+        }
+    }
+    let (mut cut_off, mut rest): (Pieces, Pieces) = others.into_iter().partition(is_solid);
+    cut_off.extend(bars);
+    if cut_off.len() >= SOLIDS_LIMIT {
+        cut_off.sort_by(|a, b| area(b).total_cmp(&area(a)));
+        rest.extend(cut_off.split_off(SOLIDS_LIMIT - 1));
+    }
     let mut walls = Vec::new();
     rest.iter_mut().for_each(|piece| cut_walls(positions, triangles, piece, WALL * whole, &mut walls));
     if cut_off.len() + walls.len() < SOLIDS_LIMIT {
@@ -82,7 +100,7 @@ pub fn lamps(positions: &[Vec3], triangles: &[[u32; 3]]) -> Vec<u32> {
     join_touching(positions, triangles, &mut pieces);
     // What has nearly no area is no mesh of its own.
     let whole = area_m2(positions, triangles);
-    pieces.retain(|piece| area_m2(positions, &of(triangles, piece)) > 1e-6 * whole);
+    pieces.retain(|piece| area_m2(positions, &subset(triangles, piece)) > 1e-6 * whole);
     let mut lamps = Vec::new();
     if pieces.len() > LAMPS_LIMIT {
         let size = pieces.len().div_ceil(LAMPS_LIMIT / 2);
@@ -113,18 +131,6 @@ fn number(numbers: &mut [u32], pieces: &[Vec<u32>]) {
     }
 }
 
-fn of(triangles: &[[u32; 3]], piece: &[u32]) -> Vec<[u32; 3]> {
-    piece.iter().map(|triangle| triangles[*triangle as usize]).collect()
-}
-
-/// Pieces that hang together.
-fn loose(positions: &[Vec3], triangles: &[[u32; 3]]) -> Pieces {
-    let numbers = topology::piece_numbers(positions, triangles);
-    let mut pieces = vec![Vec::new(); numbers.iter().max().map_or(0, |last| *last as usize + 1)];
-    (0..).zip(numbers).for_each(|(triangle, number)| pieces[number as usize].push(triangle));
-    pieces
-}
-
 /// The box around a piece.
 fn extent(positions: &[Vec3], triangles: &[[u32; 3]], piece: &[u32]) -> [Vec3; 2] {
     let corners = || piece.iter().flat_map(|triangle| triangles[*triangle as usize]).map(|v| positions[v as usize]);
@@ -135,7 +141,7 @@ fn extent(positions: &[Vec3], triangles: &[[u32; 3]], piece: &[u32]) -> [Vec3; 2
 /// where the shell that they are part of has the coarse maps of its vertices. Walls of less than `least_m2` stay. A shell
 /// that is closed may be a solid that was wound inside out.
 fn cut_walls(positions: &[Vec3], triangles: &[[u32; 3]], piece: &mut Vec<u32>, least_m2: f64, walls: &mut Pieces) {
-    let own = of(triangles, piece);
+    let own = subset(triangles, piece);
     let area = area_m2(positions, &own);
     if area < 2.0 * least_m2 {
         return;
@@ -160,13 +166,13 @@ fn cut_walls(positions: &[Vec3], triangles: &[[u32; 3]], piece: &mut Vec<u32>, l
     let mut found = Vec::new();
     let mut walls_m2 = 0.0;
     for (_, offset, plane) in planes {
-        let own = of(triangles, &plane);
+        let own = subset(triangles, &plane);
         if offset >= 0.0 || area_m2(positions, &own) < least_m2 {
             continue;
         }
         let (corners, own) = topology::apart(positions, &own);
         for part in loose(&corners, &own) {
-            let Ok(wall) = Mesh::new("", corners.clone(), Vec::new(), None, of(&own, &part)) else { continue };
+            let Ok(wall) = Mesh::new("", corners.clone(), Vec::new(), None, subset(&own, &part)) else { continue };
             if wall.rectangle().is_some() && wall.area_m2() >= least_m2 {
                 walls_m2 += wall.area_m2();
                 found.push(part.iter().map(|number| plane[*number as usize]).collect::<Vec<u32>>());
@@ -212,7 +218,7 @@ fn join_touching(positions: &[Vec3], triangles: &[[u32; 3]], pieces: &mut Pieces
 
 /// Cuts a bent piece in halves across its longest extent, and these again.
 fn unbend(positions: &[Vec3], triangles: &[[u32; 3]], piece: &[u32], halvings: u32, out: &mut Pieces) {
-    let own = of(triangles, piece);
+    let own = subset(triangles, piece);
     let axes = own_axes(positions, &own);
     let along = |triangle: &[u32; 3]| triangle.map(|v| axes.transpose() * positions[v as usize]);
     let corners = || own.iter().flat_map(along);

@@ -1,7 +1,8 @@
 #version 460
 #extension GL_EXT_samplerless_texture_functions : require
 // Takes a pixel's light from the four coarse texels around it, where they lie on its surface and no edge runs between
-// them. An edge is near to all four that it runs between, or they differ. Other pixels are left to be evaluated.
+// them, neither of a shadow nor of a facet. An edge is near to all four that it runs between, or they differ. Other pixels
+// are left to be evaluated.
 #include "screen_light.glsl"
 layout(binding = COARSE_BINDING) uniform utexture2D coarse;
 layout(location = 0) out uvec4 kept;
@@ -46,7 +47,7 @@ void main() {
         near += fits && is_edge_near(texel) ? 1 : 0;
     }
     bool differ = dot(most - least, vec3(1.0)) > MOST_CHANGE * dot(most, vec3(1.0));
-    if (whole < LEAST_WHOLE || near == 4 || near > 0 && (found < 4 || differ)) {
+    if (whole < LEAST_WHOLE || near == 4 || near > 0 && found < 4 || differ) {
         discard;
     }
     kept = pack_light(push.receiver, gl_FragCoord.z, light / whole, shares / whole, false);

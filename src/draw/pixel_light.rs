@@ -35,8 +35,8 @@ const LIGHT: vk::Format = vk::Format::R32G32B32A32_UINT;
 const COARSE_PX: u32 = 4;
 /// Share of its distance that a place may lie in front of a texel's, or behind, and have its light.
 const SAME_DEPTH: f64 = 1e-4;
-/// Share of the brightest of four coarse texels by which they may differ where an edge is near some of them.
-const MOST_CHANGE: f64 = 0.1;
+/// Share of the brightest of four coarse texels by which they may differ.
+const MOST_CHANGE: f64 = 0.08;
 /// Least weight of the four coarse texels around a pixel that lie on its surface.
 const LEAST_WHOLE: f64 = 0.5;
 /// Binding of the image in the shaders that look it up.

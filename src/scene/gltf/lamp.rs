@@ -1,6 +1,6 @@
 //! Punctual lights as glowing balls, of which spots shine within a cone, and a directional light as a distant disc.
 //!
-//! A point has no size, so a lamp gets one, which is said: a hundredth of the scene's radius. Candela are taken as W
+//! A point has no size, so a lamp gets one, which is said: a hundredth of the scene's radius, at most a bulb's. Candela are taken as W
 //! sr^-1, and the ball's radiance is the intensity over its mean outline, so that what is lit from afar does not depend
 //! on the radius.
 
@@ -19,8 +19,10 @@ use crate::scene::data::{EntityData, MeshData};
 use crate::scene::light::Spot;
 use crate::scene::motion::{Motion, RotationData};
 
-/// Radius of a lamp, as a share of the scene's.
+/// Radius of a lamp, as a share of the scene's, and the most in metres, that of a bulb: a larger ball would reach into the
+/// shade around it.
 const RADIUS_SHARE: f64 = 0.01;
+const RADIUS_M: f64 = 0.03;
 /// Cuts of the icosahedron that stands for a ball: 320 triangles.
 const SUBDIVISIONS: u32 = 2;
 pub const BALL: &str = "lamp";
@@ -81,7 +83,7 @@ impl Lamps {
         }
         let generator = Generator::Sphere { radius_m: 1.0, subdivisions: SUBDIVISIONS };
         let mesh = generator.build()?;
-        let radius_m = (scene_radius_m * RADIUS_SHARE).clamp(1e-4, 1e4);
+        let radius_m = (scene_radius_m * RADIUS_SHARE).clamp(1e-4, RADIUS_M);
         // A convex body's mean outline is its area over four.
         let outline_m2 = mesh.area_m2() / 4.0 * radius_m.powi(2);
         for (light, stand) in &lights {

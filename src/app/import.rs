@@ -1,11 +1,11 @@
-//! `shadow-fields import` writes a glTF file as a scene file.
+//! `shadow-fields import` writes a glTF or OBJ file as a scene file.
 
 use super::outputs::{self, Output};
 use super::source::GltfSceneArguments;
 use super::{Global, output};
 use crate::error::{Error, Result, one_line};
 use crate::files;
-use crate::scene::{self, Scene, gltf};
+use crate::scene::{self, Scene, gltf, single};
 use crate::text::number;
 use clap::Args;
 use serde_json::json;
@@ -14,12 +14,12 @@ use std::path::{Path, PathBuf};
 
 #[derive(Args)]
 #[command(
-    after_help = "The scene file can be edited like any other; it names the glTF file for meshes and textures, which has to stay. \
+    after_help = "The scene file can be edited like any other; it names the glTF or OBJ file for meshes and textures, which has to stay. \
     `render` gives the same picture of both. What has no form in a scene file is left out, with a line for each kind.\n\n\
     Example:\n  shadow-fields import robot.glb -o robot.toml && shadow-fields render robot.toml -o robot.png --frames 48"
 )]
 pub struct Arguments {
-    /// glTF 2.0 file, .glb or .gltf
+    /// glTF 2.0 file, .glb or .gltf, or an OBJ file, .obj
     scene: PathBuf,
     /// Scene file to write
     #[arg(short, long, value_name = "SCENE.toml")]
@@ -52,10 +52,10 @@ impl Arguments {
 /// Start of the comment in the first line of every imported file.
 const HEAD: &str = "Written by shadow-fields import";
 
-/// Reads a glTF file and writes it as a scene file.
+/// Reads a glTF or OBJ file and writes it as a scene file.
 pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
-    if !gltf::is_gltf(&arguments.scene) {
-        return Err(Error::Usage(format!("{}: expected a .glb or .gltf file", arguments.scene.display())));
+    if !gltf::is_gltf(&arguments.scene) && !single::is_obj(&arguments.scene) {
+        return Err(Error::Usage(format!("{}: expected a .glb, .gltf or .obj file", arguments.scene.display())));
     }
     let inputs = scene::files::of_scene(&arguments.scene);
     let output = Output::new("--output", &arguments.output, "toml");

@@ -326,7 +326,7 @@ pub struct MeshData {
     pub file: Option<PathBuf>,
     /// Mesh and primitive of a glTF file, counted from 0.
     pub part: Option<[usize; 2]>,
-    /// One of the pieces of the part, counted from 0: loose solids, thin bars together, walls of rooms, and last the
+    /// One of the pieces of the part, or of an OBJ file, counted from 0: loose solids, thin bars together, walls of rooms, and last the
     /// rest; of what glows, lamps that stand apart. The default takes all.
     pub piece: Option<u32>,
     /// Columns of a matrix that scales, mirrors or shears the part. The default leaves it as it is.
@@ -360,9 +360,12 @@ impl MeshData {
     /// Refuses keys that do not go together.
     pub(super) fn check(&self) -> std::result::Result<(), &'static str> {
         let of_gltf = self.file.as_deref().is_some_and(super::gltf::is_gltf);
-        let is_of_part = self.piece.is_some() || self.bend.is_some() || self.pose.is_some();
+        let of_obj = self.file.as_deref().is_some_and(super::single::is_obj);
+        let is_of_part = self.piece.is_some() && !of_obj || self.bend.is_some() || self.pose.is_some();
         if self.part.is_some() && !of_gltf || is_of_part && self.part.is_none() {
-            return Err("it takes a part of a glTF file alone, and a piece, a bend and a pose of a part alone");
+            return Err(
+                "it takes a part of a glTF file alone, a bend and a pose of a part, and a piece of a part or an OBJ file",
+            );
         }
         if self.joined.is_some() && (!of_gltf || self.part.is_some()) {
             return Err("it takes either a part of a glTF file or several joined");

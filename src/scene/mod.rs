@@ -20,7 +20,7 @@ pub mod surroundings;
 pub mod values;
 
 use std::collections::{BTreeSet, HashMap};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use glam::{DMat3, DVec3, Vec3};
@@ -38,6 +38,7 @@ pub use data::{Albedo, Camera, Data, EntityData, MeshData, Output, TextureData};
 pub use gloss::{Gloss, MapIndices, Maps};
 pub use light::{LightMethod, Lights, Spot};
 pub use motion::{Motion, Placement};
+use single::Apart;
 pub use surroundings::Surroundings;
 
 /// Largest number of entities in a scene.
@@ -194,6 +195,7 @@ impl Scene {
         };
 
         let mut readers = gltf::Readers::new(folder);
+        let mut apart = HashMap::new();
         let textures = read_textures(&data, &read, &mut readers)
             .map_err(|(i, what)| Error::input_at(path, lines.of(lines.tables.textures.get(i)), what))?;
         let mut meshes: Vec<Arc<Mesh>> = Vec::with_capacity(data.meshes.len());
@@ -202,8 +204,8 @@ impl Scene {
             if data.meshes[..i].iter().any(|m| m.name == mesh.name) {
                 return Err(at(format!("there are two meshes {:?}", mesh.name)));
             }
-            let built =
-                build_mesh(mesh, folder, &read, &mut readers).map_err(|e| at(format!("mesh {:?}: {e}", mesh.name)))?;
+            let built = build_mesh(mesh, folder, &read, &mut readers, &mut apart)
+                .map_err(|e| at(format!("mesh {:?}: {e}", mesh.name)))?;
             meshes.push(Arc::new(built));
         }
         let fail = |i, what| Error::input_at(path, lines.of(lines.tables.entities.get(i)), what);
@@ -687,6 +689,7 @@ fn build_mesh(
     folder: &Path,
     read: &dyn Fn(&Path) -> Result<Vec<u8>>,
     readers: &mut gltf::Readers,
+    apart: &mut HashMap<PathBuf, Apart>,
 ) -> Result<Mesh> {
     data.check().map_err(|what| Error::Input(what.into()))?;
     let mut mesh = match (&data.file, &data.generator) {
@@ -705,7 +708,14 @@ fn build_mesh(
             notes.left_out().iter().for_each(|line| log::warn!("{}: {line}", path.display()));
             mesh
         }
-        (Some(file), None) => Mesh::parse(&read(file)?, &folder.join(file))?,
+        (Some(file), None) => {
+            let whole = || Mesh::parse(&read(file)?, &folder.join(file));
+            match (data.piece, apart.get(file)) {
+                (None, _) => whole()?,
+                (Some(piece), Some(known)) => known.piece(piece)?,
+                (Some(piece), None) => apart.entry(file.clone()).or_insert(Apart::new(whole()?)).piece(piece)?,
+            }
+        }
         (None, Some(generator)) => generator.build()?,
         _ => return Err(Error::Input("it has either a file or one generator".into())),
     };

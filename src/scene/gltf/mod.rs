@@ -36,7 +36,7 @@ mod document;
 mod join;
 mod lamp;
 mod notes;
-mod pieces;
+pub(super) mod pieces;
 mod pose;
 mod shape;
 mod surface;

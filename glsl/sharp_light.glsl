@@ -250,20 +250,33 @@ vec4 let_through(Entity occluder, Surface surface, SeenLight light, Block block,
         in_box[k] = vec2(-NO_BOX, NO_BOX);
 #if BOXES
         if (first < HAS_HALVES) {
-            in_box[k] = through_box(field, place, direction);
+            in_box[k] = box_slabs(field, place, direction);
         }
 #endif
         limit[k] = before ? reach_of(light, part, rays.along[k]) * occluder.centre.w : EVERYTHING;
         float sine = part_sine(light, block, part, rays.along[k]);
         tangent[k] = sine * inversesqrt(1.0 - sine * sine);
     }
+#if BOXES
+    uint faces = first < HAS_HALVES ? face_count(field) : 0;
+    for (uint face = 0; face < faces; face++) {
+        vec4 plane = face_plane(field, face);
+        vec3 normal = plane.xyz * rays.axes;
+        EACH for (uint k = 0; k < 4; k++) {
+            in_box[k] = cut_by_face(in_box[k], dot(normal, rays.along[k]), plane.w - dot(plane.xyz, place));
+        }
+    }
+    EACH for (uint k = 0; k < 4; k++) {
+        in_box[k] = if_met(in_box[k]);
+    }
+#endif
     vec4 inside = vec4(0.0), all = vec4(0.0);
     bool behind = false; // whether the box lies behind the point
 #if HALVES
     // Within the bounding sphere each half of the object counts as far as its outline lies between the point and the
     // light, unless all of its box does before a light outside, or its box lies behind the point.
     if (before && first >= HAS_HALVES) {
-        vec2 box = through_box(field, place, rays.axes * rays.middle);
+        vec2 box = if_met(box_slabs(field, place, rays.axes * rays.middle));
         behind = box[1] < TOUCHING;
         float outside = outside_ball(rays.place);
         EACH for (uint k = 0; k < 4; k++) {

@@ -2,8 +2,8 @@
 // with the same names. NODE_CELLS: cells along a face of the node grid; MAP: texels along a map of the whole object,
 // half as many along those of its halves.
 //
-// A field begins with two quads, the least and the largest corner of a box around the object (its frame, in r), then
-// come the nodes. Nodes are three quads each: two rows that take a point (object's frame, in r) to its place on the
+// A field begins with two quads, the least and the largest corner of a box around the object (its frame, in r), whose w
+// is the number of further faces; before it stand their planes, the last one first. Then come the nodes. Nodes are three quads each: two rows that take a point (object's frame, in r) to its place on the
 // map, in texels from the middle of the first; and edges of a texel in r, the map's first cell, and -1 where the map is
 // seen from behind. Cells are the four texels around a point between them: signed bytes of distance and of depth.
 #include "readable.glsl"
@@ -146,10 +146,27 @@ vec2 outline(NearMap near, uint side, vec3 along, vec3 foot) {
 }
 
 #if BOXES || HALVES
-// Where a ray enters the box around an object and where it leaves it. If it misses the box, the interval has no ends,
-// and the outline alone decides.
-vec2 through_box(uint field, vec3 point, vec3 direction) {
-    vec2 ends = slabs(node_quad(field).xyz - point, node_quad(field + 1).xyz - point, direction);
+// Where a ray enters the box around an object, or its faces, and where it leaves them. If it misses one, the interval has
+// no ends, and the outline alone decides.
+vec2 if_met(vec2 ends) {
     return ends.x > ends.y ? vec2(-NO_BOX, NO_BOX) : ends;
+}
+
+vec2 box_slabs(uint field, vec3 point, vec3 direction) {
+    return slabs(node_quad(field).xyz - point, node_quad(field + 1).xyz - point, direction);
+}
+
+uint face_count(uint field) {
+    return uint(node_quad(field).w);
+}
+
+vec4 face_plane(uint field, uint face) {
+    return node_quad(field - 1 - face);
+}
+
+// What the plane of a face leaves of a ray that is turned `along` its normal and begins so far below it.
+vec2 cut_by_face(vec2 ends, float along, float below) {
+    float at = below / (abs(along) < LEAST_STEP ? LEAST_STEP : along);
+    return along <= -LEAST_STEP ? vec2(max(ends.x, at), ends.y) : vec2(ends.x, min(ends.y, at));
 }
 #endif

@@ -10,7 +10,9 @@ use super::triangles::unit_positions;
 use super::{BakeReport, Baker, Progress, hash_text, levels};
 use crate::asset::mesh::Mesh;
 use crate::error::{Error, Result};
-use crate::field::silhouette::{MapFrame, REACH, SURFACE, Side, SilhouetteField, SilhouetteHeader, encode};
+use crate::field::silhouette::{
+    FACES_LIMIT, MapFrame, REACH, SURFACE, Side, SilhouetteField, SilhouetteHeader, encode,
+};
 use crate::field::silhouette_nodes::NodeGrid;
 use crate::gpu::{
     Access, Bind, Buffer, BufferKind, Commands, ComputePipeline, Device, GraphicsPipeline, GraphicsState, Image,
@@ -19,7 +21,7 @@ use crate::gpu::{
 use crate::shaders::{Library, ShaderPermutation};
 use ash::vk;
 use bytemuck::{Pod, Zeroable};
-use glam::{DVec2, DVec3, Vec4};
+use glam::{DVec2, DVec3, Vec3, Vec4};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use std::borrow::Cow;
@@ -66,6 +68,7 @@ pub fn silhouette_header(mesh: &Mesh, options: SilhouetteOptions) -> SilhouetteH
         centre_m: centre.to_array(),
         radius_m,
         extent: extent(mesh),
+        faces: faces(mesh),
         mesh: mesh.name.clone(),
         mesh_hash: hash_text(mesh),
     }
@@ -77,6 +80,31 @@ fn extent(mesh: &Mesh) -> [[f32; 3]; 2] {
     let start = (positions[0], positions[0]);
     let (low, high) = positions.iter().fold(start, |(low, high), p| (low.min(*p), high.max(*p)));
     [low.to_array(), high.to_array()]
+}
+
+/// Normals and distances of the faces of a convex mesh, but for those of the box of its extent; none where there are more
+/// than [`FACES_LIMIT`].
+fn faces(mesh: &Mesh) -> Vec<[f32; 4]> {
+    const SAME: f32 = 1.0 - 1e-5;
+    let mut found: Vec<[f32; 4]> = Vec::new();
+    if !mesh.is_convex() {
+        return found;
+    }
+    let positions = unit_positions(mesh);
+    for triangle in &mesh.triangles {
+        let [a, b, c] = triangle.map(|v| positions[v as usize]);
+        let Some(normal) = (b - a).cross(c - a).try_normalize() else { continue };
+        let is_same = |face: &[f32; 4]| normal.dot(Vec3::from_slice(face)) > SAME;
+        if normal.abs().max_element() > SAME || found.iter().any(is_same) {
+            continue;
+        }
+        let distance = positions.iter().map(|p| normal.dot(*p)).fold(f32::MIN, f32::max);
+        found.push(normal.extend(distance).to_array());
+        if found.len() > FACES_LIMIT {
+            return Vec::new();
+        }
+    }
+    found
 }
 
 fn frames(mesh: &Mesh, nodes: &NodeGrid, count: usize) -> Vec<MapFrame> {

@@ -38,6 +38,8 @@ impl Side {
     }
 }
 
+/// Most faces that are kept of a convex mesh.
+pub const FACES_LIMIT: usize = 12;
 /// Bound on coordinates in bounding radii: 1 and what rounding adds.
 const MOST_EXTENT: f32 = 1.01;
 
@@ -62,6 +64,10 @@ pub struct SilhouetteHeader {
     pub radius_m: f32,
     /// Least and largest coordinates of the mesh from that centre, in its own frame and in bounding radii.
     pub extent: [[f32; 3]; 2],
+    /// Planes of the faces of a convex mesh that has few, but for those of the box: unit normal, and distance from the
+    /// centre in bounding radii.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub faces: Vec<[f32; 4]>,
     /// Name of the mesh, for people.
     pub mesh: String,
     /// Content hash of the mesh, hexadecimal.
@@ -120,6 +126,10 @@ impl SilhouetteHeader {
             return bad("centre or radius is not a usable number".into());
         }
         let [low, high] = self.extent;
+        let is_face = |face: &[f32; 4]| face.iter().all(|x| x.abs() <= MOST_EXTENT);
+        if self.faces.len() > FACES_LIMIT || !self.faces.iter().all(is_face) {
+            return bad(format!("faces {:?}", self.faces));
+        }
         let ordered = (0..3).all(|i| low[i] <= high[i] && low[i] >= -MOST_EXTENT && high[i] <= MOST_EXTENT);
         if ordered { Ok(()) } else { bad(format!("an extent from {low:?} to {high:?} within a sphere of radius 1")) }
     }

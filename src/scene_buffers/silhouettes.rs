@@ -50,7 +50,7 @@ impl Silhouettes {
         let mut known = HashMap::<*const SilhouetteField, u32>::new();
         let mut slot = |field: &Arc<SilhouetteField>| {
             let first_quad = *known.entry(Arc::as_ptr(field)).or_insert_with(|| {
-                let first = nodes.len() as u32;
+                let first = (nodes.len() + field.faces().len()) as u32;
                 nodes.extend(field.node_quads(cells.len() as u32));
                 cells.extend(field.cells());
                 first

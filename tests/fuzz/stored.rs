@@ -59,6 +59,7 @@ fn outline_field() -> SilhouetteField {
         centre_m: [0.0; 3],
         radius_m: 1.0,
         extent: [[-0.5; 3], [0.5; 3]],
+        faces: vec![[0.6, 0.8, 0.0, 0.7]],
         mesh: "m".into(),
         mesh_hash: String::new(),
     };

@@ -303,3 +303,28 @@ fn several_lamps_leave_a_table_its_shadow() {
     let error = picture_error(&gpu, &scene.build().unwrap());
     assert!(error < 0.05, "{error}");
 }
+
+/// A slab of a roof lies on a gable: the box around this reaches to above the slab, its faces do not (0.34).
+#[test]
+fn a_gable_casts_no_shadow_on_the_roof_above_it() {
+    let Some(gpu) = gpu() else { return };
+    let bent = |place: fn(Vec3) -> Vec3| {
+        let solid = generate::cuboid(Vec3::ONE, 1);
+        let places = solid.positions.iter().map(|p| place(*p)).collect();
+        Mesh::new("bent", places, Vec::new(), None, solid.triangles).unwrap()
+    };
+    let gable = bent(|p| Vec3::new(4.0 * p.x * (0.5 - p.y), 0.9 * (0.5 + p.y), 6.0 * p.z));
+    let slab = bent(|p| Vec3::new(2.0 * (0.5 + p.x), 0.9 * (0.5 - p.x) + 0.1 * (0.5 + p.y), 6.0 * p.z));
+    assert!(gable.is_convex() && slab.is_convex());
+    let sky = r#"uniform = [0.2, 0.2, 0.2]
+sun = { toward = [0.8, 0.6, 0.3], angle_deg = 1, radiance = [6000, 6000, 6000] }"#;
+    let scene = Scene::builder()
+        .camera(Camera::new([4.0, 4.0, 4.0], [0.0, 0.4, 0.0]))
+        .environment(toml::from_str(sky).unwrap())
+        .mesh("gable", gable)
+        .mesh("slab", slab)
+        .entity(EntityData::of_mesh("gable"))
+        .entity(EntityData::of_mesh("slab"));
+    let error = picture_error(&gpu, &scene.build().unwrap());
+    assert!(error < 0.05, "{error}");
+}

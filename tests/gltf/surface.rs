@@ -102,7 +102,7 @@ fn an_imported_scene_has_the_same_textures_and_parts() {
 
     for (from, to, message) in [
         ("part = [0, 0]", "part = [0, 7]", "meshes[0].primitives[7]: there is no such primitive"),
-        ("part = [0, 0]\n", "", "takes a part of a glTF file alone, and a piece, a bend and a pose of a part alone"),
+        ("part = [0, 0]\n", "", "a piece of a part or an OBJ file"),
         ("image = 0", "image = 3", "images[3]: there is no such image"),
         ("image = 0", "", "`image` says which image of a glTF file it is"),
         ("albedo = \"leaf\"", "albedo = \"bark\"", "there is no texture \"bark\""),

@@ -3,6 +3,7 @@
 
 use super::cache::{Cache, field_name};
 use super::surfaces::{BakedSurface, SurfacePlan};
+use super::triangles::have_one_shape;
 use super::{BakeReport, Baker, Options, Wanted, header};
 use crate::asset::Mesh;
 use crate::error::Result;
@@ -191,7 +192,7 @@ pub fn ensure(
     };
     // Equal meshes of two names share fields, which are looked for once.
     let mut fields: HashMap<String, Arc<ShadowField>> = HashMap::new();
-    let mut silhouettes: HashMap<[u8; 32], Arc<SilhouetteField>> = HashMap::new();
+    let mut silhouettes: Vec<(&Arc<Mesh>, Arc<SilhouetteField>)> = Vec::new();
     let mut lamp_colors: HashMap<[u8; 32], Arc<LampColors>> = HashMap::new();
     let mut meshes = Vec::with_capacity(scene.meshes.len());
     for (index, (needed, headers)) in needs.meshes.iter().enumerate() {
@@ -209,14 +210,19 @@ pub fn ensure(
             *to = Some(fields[&name].clone());
         }
         if needed.silhouette {
-            let hash = mesh.content_hash();
-            if !silhouettes.contains_key(&hash) {
-                let what = silhouette_title(mesh);
-                let (found, report) = cache.silhouette(baker, mesh, options, &|now, all| progress(&what, now, all))?;
-                note(&what, report);
-                silhouettes.insert(hash, found);
-            }
-            to.silhouette = Some(silhouettes[&hash].clone());
+            // Outlines are about the mesh's own centre: those of a row of columns are one.
+            let known = silhouettes.iter().find(|(other, _)| have_one_shape(other, mesh));
+            to.silhouette = Some(match known {
+                Some((_, known)) => known.clone(),
+                None => {
+                    let what = silhouette_title(mesh);
+                    let tell = |now, all| progress(&what, now, all);
+                    let (found, report) = cache.silhouette(baker, mesh, options, &tell)?;
+                    note(&what, report);
+                    silhouettes.push((mesh, found.clone()));
+                    found
+                }
+            });
         }
         if needed.lamp_colors {
             let mesh = &scene.meshes[index];

@@ -11,6 +11,14 @@ pub fn unit_positions(mesh: &Mesh) -> Vec<Vec3> {
     mesh.positions.iter().map(|p| ((p.as_dvec3() - centre.as_dvec3()) / f64::from(radius_m)).as_vec3()).collect()
 }
 
+/// Whether meshes are the same but for their place and size, within 1e-4 of the radius.
+pub fn have_one_shape(a: &Mesh, b: &Mesh) -> bool {
+    const SAME: f32 = 1e-4;
+    let is_same = || unit_positions(a).iter().zip(unit_positions(b)).all(|(p, q)| p.abs_diff_eq(q, SAME));
+    a.content_hash() == b.content_hash()
+        || a.positions.len() == b.positions.len() && a.triangles == b.triangles && is_same()
+}
+
 /// The weights of the second and third corner of a triangle at a place of its plane, both given from the first corner.
 pub fn weights(edges: [Vec3A; 2], place: Vec3A) -> [f32; 2] {
     let normal = edges[0].cross(edges[1]);
@@ -57,6 +65,18 @@ pub(super) fn tell_repeated(mesh: &Mesh) {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn meshes_of_one_shape_differ_in_place_and_size() {
+        let torus = generate::torus(1.0, 0.3, 24, 12);
+        let moved = |place: fn(Vec3) -> Vec3| {
+            let places = torus.positions.iter().map(|p| place(*p)).collect();
+            Mesh::new("moved", places, Vec::new(), None, torus.triangles.clone()).unwrap()
+        };
+        assert!(have_one_shape(&torus, &moved(|p| 0.7 * p + Vec3::new(3.0, -20.0, 5.0))));
+        assert!(!have_one_shape(&torus, &moved(|p| p * Vec3::new(1.0, 1.01, 1.0))));
+        assert!(!have_one_shape(&torus, &generate::torus(1.0, 0.3, 12, 24)));
+    }
     use crate::asset::generate;
 
     #[test]

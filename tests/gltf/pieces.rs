@@ -130,7 +130,7 @@ fn solids_are_cut_off_and_bars_stay_together() {
     let parts: Vec<(&Mesh, Vec3)> = [(&ring, 3.0 * Vec3::X), (&ball, 5.0 * Vec3::X)].into_iter().chain(bars).collect();
     let found = meshes(&parts, json!({}));
     assert_eq!(found.len(), 3);
-    assert_eq!(found.iter().map(|mesh| mesh.boxes().len()).collect::<Vec<_>>(), [0, 0, 5]);
+    assert_eq!(found.iter().map(|mesh| mesh.boxes().len()).collect::<Vec<_>>(), [5, 0, 0]);
 }
 
 #[test]

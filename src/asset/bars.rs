@@ -46,6 +46,7 @@ pub(super) fn bars(mesh: &Mesh) -> Vec<PlacedCuboid> {
     for piece in topology::loose(&mesh.positions, &mesh.triangles) {
         let triangles = topology::subset(&mesh.triangles, &piece);
         match bar(&mesh.positions, &triangles) {
+            Some(boxes) if found.len() + boxes.len() > BARS_LIMIT => return Vec::new(),
             Some(boxes) => found.extend(boxes),
             None => others.extend(triangles),
         }
@@ -57,7 +58,7 @@ pub(super) fn bars(mesh: &Mesh) -> Vec<PlacedCuboid> {
             boxes => found.extend(boxes),
         }
     }
-    if found.len() > BARS_LIMIT { Vec::new() } else { found }
+    found
 }
 
 /// The boxes along a piece that hangs together, if it is slender.

@@ -133,6 +133,19 @@ fn solids_are_cut_off_and_bars_stay_together() {
     assert_eq!(found.iter().map(|mesh| mesh.boxes().len()).collect::<Vec<_>>(), [5, 0, 0]);
 }
 
+/// What moves and has solids that are not convex stays whole.
+#[test]
+fn concave_solids_that_move_stay_together() {
+    let ring = generate::torus(0.4, 0.1, 24, 12);
+    let mut model = Model::default();
+    let mesh = model.shape(&joined(&[(&ring, Vec3::ZERO), (&ring, 3.0 * Vec3::X)]), None);
+    let node = model.node(json!({ "mesh": mesh, "name": "rings" }));
+    let count = |model: &Model| load(model).1.entities.iter().filter(|entity| entity.name.starts_with("rings")).count();
+    assert_eq!(count(&model), 2);
+    model.animate(0, node, "translation", "LINEAR", &[0.0, 1.0], &[0.0, 0.0, 0.0, 1.0, 0.0, 0.0]);
+    assert_eq!(count(&model), 1);
+}
+
 #[test]
 fn pieces_move_with_their_node() {
     let mut model = bench(json!({}));

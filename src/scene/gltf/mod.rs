@@ -174,6 +174,11 @@ impl Primitive {
         self.shape.mesh(document, name, bend, self.surface.attributes.clone(), keeps)
     }
 
+    fn is_cut_into_concave_solids(&self) -> bool {
+        let numbers = self.pieces();
+        self.surface.is_solid() && pieces::any_concave(self.shape.positions(), self.shape.triangles(), numbers)
+    }
+
     /// The number of the piece that each triangle belongs to. Surfaces that let light through stay whole, and so do the
     /// many cards of a plant, and what glows in a pattern.
     fn pieces(&self) -> &[u32] {
@@ -598,10 +603,11 @@ impl Builder {
         Ok(candidates)
     }
 
-    /// How many pieces a part is cut into.
+    /// How many pieces a part is cut into. Of what moves the field of each solid that is not convex would take a second.
     fn piece_count(&mut self, placed: &Placed) -> Result<u32> {
-        let primitive = self.reader.primitive(placed.part)?;
-        Ok(primitive.and_then(|primitive| primitive.pieces().iter().max().copied()).map_or(1, |last| last + 1))
+        let Some(primitive) = self.reader.primitive(placed.part)? else { return Ok(1) };
+        let stays_whole = !placed.stand.motion.is_empty() && primitive.is_cut_into_concave_solids();
+        Ok(if stays_whole { 1 } else { primitive.pieces().iter().max().map_or(1, |last| last + 1) })
     }
 
     /// The entity of a part, if it has triangles.

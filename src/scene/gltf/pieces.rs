@@ -98,6 +98,17 @@ pub fn solids(positions: &[Vec3], triangles: &[[u32; 3]]) -> Vec<u32> {
     numbers
 }
 
+/// Whether a piece but the last, which is the rest, hangs together and is not convex.
+pub fn any_concave(positions: &[Vec3], triangles: &[[u32; 3]], numbers: &[u32]) -> bool {
+    let last = numbers.iter().max().copied().unwrap_or(0);
+    let is_concave = |piece: u32| {
+        let own: Vec<u32> = (0..).zip(numbers).filter(|(_, number)| **number == piece).map(|(of, _)| of).collect();
+        let own = subset(triangles, &own);
+        loose(positions, &own).len() == 1 && !topology::is_convex(positions, &own)
+    };
+    (0..last).any(is_concave)
+}
+
 /// The number of the lamp that each triangle belongs to. A light of one outline is right from afar: each of the bulbs of
 /// a chandelier is a lamp, and so is each part of a ring that is bent.
 pub fn lamps(positions: &[Vec3], triangles: &[[u32; 3]]) -> Vec<u32> {

@@ -95,16 +95,32 @@ impl SceneNeeds {
         fields + volumes.map(|volume| (volume.nodes.count() * node_bytes) as u64).sum::<u64>()
     }
 
+    /// For every mesh that needs outlines the first that has its shape, whose outlines are its own: they are about the
+    /// mesh's centre, so that those of a row of columns are one.
+    fn outlined_as(&self, scene: &Scene) -> Vec<Option<usize>> {
+        let mut firsts: Vec<usize> = Vec::new();
+        let mut first_of = |index: usize| {
+            let mesh = scene.caster(index);
+            let known = firsts.iter().copied().find(|first| have_one_shape(scene.caster(*first), mesh));
+            known.unwrap_or_else(|| {
+                firsts.push(index);
+                index
+            })
+        };
+        let needed = self.meshes.iter().enumerate();
+        needed.map(|(index, (needed, _))| needed.silhouette.then(|| first_of(index))).collect()
+    }
+
     /// The bakes that [`ensure()`] will not find in the cache, in its order: the name that progress is told by, and the
     /// number of captures.
     pub fn missing(&self, scene: &Scene, cache: &Cache) -> Vec<(String, u32)> {
         let mut missing: Vec<(String, u32)> = Vec::new();
-        for (index, (needed, headers)) in self.meshes.iter().enumerate() {
+        for ((index, (_, headers)), first) in self.meshes.iter().enumerate().zip(self.outlined_as(scene)) {
             let mesh = scene.caster(index);
             for header in headers.iter().flatten().filter(|header| !cache.has_field(header)) {
                 missing.push((field_title(mesh, header), header.lattice.sample_count()));
             }
-            if needed.silhouette && !cache.has_silhouette(mesh, &self.options) {
+            if first == Some(index) && !cache.has_silhouette(mesh, &self.options) {
                 missing.push((silhouette_title(mesh), NodeGrid::map_count(self.options.silhouette.cells) as u32));
             }
         }
@@ -192,10 +208,10 @@ pub fn ensure(
     };
     // Equal meshes of two names share fields, which are looked for once.
     let mut fields: HashMap<String, Arc<ShadowField>> = HashMap::new();
-    let mut silhouettes: Vec<(&Arc<Mesh>, Arc<SilhouetteField>)> = Vec::new();
+    let mut silhouettes: HashMap<usize, Arc<SilhouetteField>> = HashMap::new();
     let mut lamp_colors: HashMap<[u8; 32], Arc<LampColors>> = HashMap::new();
     let mut meshes = Vec::with_capacity(scene.meshes.len());
-    for (index, (needed, headers)) in needs.meshes.iter().enumerate() {
+    for ((index, (needed, headers)), first) in needs.meshes.iter().enumerate().zip(needs.outlined_as(scene)) {
         let mesh = scene.caster(index);
         let mut to = BakedMesh::default();
         for (header, to) in headers.iter().zip([&mut to.blocked, &mut to.radiance]) {
@@ -209,21 +225,13 @@ pub fn ensure(
             }
             *to = Some(fields[&name].clone());
         }
-        if needed.silhouette {
-            // Outlines are about the mesh's own centre: those of a row of columns are one.
-            let known = silhouettes.iter().find(|(other, _)| have_one_shape(other, mesh));
-            to.silhouette = Some(match known {
-                Some((_, known)) => known.clone(),
-                None => {
-                    let what = silhouette_title(mesh);
-                    let tell = |now, all| progress(&what, now, all);
-                    let (found, report) = cache.silhouette(baker, mesh, options, &tell)?;
-                    note(&what, report);
-                    silhouettes.push((mesh, found.clone()));
-                    found
-                }
-            });
+        if first == Some(index) {
+            let what = silhouette_title(mesh);
+            let (found, report) = cache.silhouette(baker, mesh, options, &|now, all| progress(&what, now, all))?;
+            note(&what, report);
+            silhouettes.insert(index, found);
         }
+        to.silhouette = first.map(|first| silhouettes[&first].clone());
         if needed.lamp_colors {
             let mesh = &scene.meshes[index];
             let silhouette = to.silhouette.as_deref().filter(|_| mesh.ball_share().is_none());

@@ -38,6 +38,32 @@ fn the_same_mesh_under_two_names_is_baked_once() {
     assert_eq!(same.surface(0).transfer_first, same.surface(1).transfer_first);
 }
 
+/// Outlines of meshes that differ in size alone are baked once, and nothing is missing then.
+#[test]
+fn meshes_of_one_shape_share_outlines() {
+    let Some(gpu) = gpu() else { return };
+    let ring = |name: &str, size: f32| {
+        let size = format!("major_m = {size}, minor_m = {}, segments = 12, sides = 8", 0.25 * size);
+        format!("[[mesh]]\nname = \"{name}\"\ntorus = {{ {size} }}\n[[entity]]\nmesh = \"{name}\"\n")
+    };
+    let light = "[environment]\nsun = { toward = [0, 1, 0], radiance = [9, 9, 9] }\n";
+    let rest = format!("{light}[camera]\neye = [0, 0, 5]\ntarget = [0, 0, 0]\n");
+    let scene = parse(&format!("{}{}{rest}", ring("a", 1.0), ring("b", 2.0)));
+    let options = bake::Options::default();
+    let needs = SceneNeeds::of(&scene, &options, shadow_fields::scene::Lights::default());
+    let folder = tempfile::tempdir().unwrap();
+    let cache = Cache::new(Some(folder.path()));
+    let outlines =
+        |names: Vec<String>| names.into_iter().filter(|name| name.ends_with("silhouette")).collect::<Vec<_>>();
+    let missing = || needs.missing(&scene, &cache).into_iter().map(|(name, _)| name).collect::<Vec<_>>();
+    assert_eq!(outlines(missing()), ["a silhouette"]);
+    let baked = bake::ensure(&gpu.baker(), &cache, &scene, &needs, &|_, _, _| ()).unwrap();
+    let [a, b] = [0, 1].map(|mesh| baked.meshes[mesh].silhouette.clone().unwrap());
+    assert!(std::sync::Arc::ptr_eq(&a, &b));
+    assert_eq!(outlines(baked.baked.into_iter().map(|baked| baked.what).collect()), ["a silhouette"]);
+    assert!(missing().is_empty(), "{:?}", missing());
+}
+
 /// Samples on an edge between faces of the lattice's cube have several numbers, and are captured once.
 #[test]
 fn what_faces_of_the_lattice_share_is_captured_once() {

@@ -60,9 +60,8 @@ uvec4 pixel_light(Entity receiver, vec3 at, Facing facings[FACINGS], uvec2 chain
     surface.step = receiver.scale * max(length(dFdx(at)), length(dFdy(at)));
 #if SHOWN
     shown_lights[0] = texelFetch(shown_lights_of, int(ALL_SHOWN_QUADS * push.receiver));
-    vec4 by_vertices = vertex_weights.x * shares_at(lit_vertices.x) + vertex_weights.y * shares_at(lit_vertices.y)
+    shown_shares[0] = vertex_weights.x * shares_at(lit_vertices.x) + vertex_weights.y * shares_at(lit_vertices.y)
                  + vertex_weights.z * shares_at(lit_vertices.z);
-    shown_shares[0] = by_vertices;
 #else
     const vec4 shown_shares[] = vec4[](vec4(0.0));
 #endif

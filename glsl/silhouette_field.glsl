@@ -3,9 +3,10 @@
 // half as many along those of its halves.
 //
 // A field begins with two quads, the least and the largest corner of a box around the object (its frame, in r), whose w
-// is the number of further faces; before it stand their planes, the last one first. Then come the nodes. Nodes are three quads each: two rows that take a point (object's frame, in r) to its place on the
-// map, in texels from the middle of the first; and edges of a texel in r, the map's first cell, and -1 where the map is
-// seen from behind. Cells are the four texels around a point between them: signed bytes of distance and of depth.
+// is the number of further faces; before it stand their planes, the last one first. Then come the nodes. Nodes are three
+// quads each: two rows that take a point (object's frame, in r) to its place on the map, in texels from the middle of the
+// first; and edges of a texel in r, the map's first cell, and -1 where the map is seen from behind. Cells are the four
+// texels around a point between them: signed bytes of distance and of depth.
 #include "readable.glsl"
 READ_VEC4(NODE_BINDING, Nodes, nodes, node_quad)
 READ_UVEC2(NODE_BINDING + 1, Cells, cells, cell_at)

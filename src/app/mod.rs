@@ -47,7 +47,7 @@ enum Subcommands {
     Render(render::Arguments),
     /// Bake the field of a mesh into an .sf file
     Bake(bake::Arguments),
-    /// Write a glTF file as a scene file with its meshes, to be edited
+    /// Write a glTF or OBJ file as a scene file with its meshes, to be edited
     Import(import::Arguments),
     /// Show what is in an .sf file: its header, one lookup
     Inspect(inspect::Arguments),

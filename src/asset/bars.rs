@@ -121,7 +121,8 @@ impl Part {
         let axes = DMat3::from_cols(x, y, x.cross(y));
         let local = || corners().map(|corner| axes.transpose() * corner);
         let [low, high] = [local().fold(DVec3::MAX, DVec3::min), local().fold(DVec3::MIN, DVec3::max)];
-        let (middle, half) = ((low + high) / 2.0, (high - low) / 2.0);
+        let middle = (low + high) / 2.0;
+        let half = (high - low) / 2.0;
         let sides_m2: f64 = sides().filter(is_side).map(DVec3::length).sum();
         let width = |before: bool| {
             let on_side = local().filter(|at| (at.x < middle.x) == before);

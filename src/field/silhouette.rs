@@ -195,8 +195,8 @@ impl SilhouetteField {
     }
 
     /// The field as `glsl/silhouette_field.glsl` reads it: the planes of faces, the last one first, two quads of the box
-    /// around the object with the number of these, then three of each node, which give places in texels from the middle of a map's first; the cells of the field's maps begin at
-    /// `first_cell`.
+    /// around the object with the number of these, then three of each node, which give places in texels from the middle
+    /// of a map's first; the cells of the field's maps begin at `first_cell`.
     pub fn node_quads(&self, first_cell: u32) -> Vec<[f32; 4]> {
         let side_cells = |side| self.header.edge_px(side).saturating_sub(1).pow(2);
         let map_cells = Side::ALL.map(side_cells).iter().sum::<usize>() as u32;

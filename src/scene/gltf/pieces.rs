@@ -68,10 +68,13 @@ pub fn solids(positions: &[Vec3], triangles: &[[u32; 3]]) -> Vec<u32> {
     others.sort_by(|a, b| area(b).total_cmp(&area(a)));
     let mut room = CONCAVE_LIMIT;
     let (solids, mut rest): (Pieces, Pieces) = others.into_iter().partition(|piece| {
-        let is_convex = || topology::is_convex(positions, &subset(triangles, piece));
-        let has_room = is_solid(piece) && (is_convex() || room > 0);
-        room -= usize::from(has_room && !is_convex());
-        has_room
+        if !is_solid(piece) {
+            return false;
+        }
+        let is_convex = topology::is_convex(positions, &subset(triangles, piece));
+        let is_cut_off = is_convex || room > 0;
+        room -= usize::from(is_cut_off && !is_convex);
+        is_cut_off
     });
     let mut cut_off = bars;
     cut_off.extend(solids);

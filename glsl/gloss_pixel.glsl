@@ -114,14 +114,15 @@ vec3 glossy(uint index, vec3 base, vec3 light, vec4 share, vec2 uv, float within
     vec2 of_unit = reflected_share(view, roughness);
     vec3 through = found.facing, nearby = found.grazing;
 #if MIRRORED
-    float of_mirror = mirror_share(entity, n, from_eye);
+    int mirror = mirror_of(entity, n, from_eye);
+    float of_mirror = mirror < 0 ? 0.0 : entity.mirror_share[mirror];
 #if PROBES
     vec3 ray = reflect(-view.toward, view.normal), place = from_eye - entity.probe.xyz;
     float turn = max(length(dFdx(ray)), length(dFdy(ray)));
     bool is_probe = entity.probe.w > 0.0;
     // What faces inwards sees its own surface, as its vertices do.
     float outward = smoothstep(-0.1, 0.1, dot(n, place) / max(length(place), 1e-6));
-    of_mirror = is_probe ? outward * entity.mirror_place.w : of_mirror;
+    of_mirror = is_probe ? outward * entity.mirror_share.x : of_mirror;
 #else
     const bool is_probe = false;
 #endif
@@ -133,7 +134,7 @@ vec3 glossy(uint index, vec3 base, vec3 light, vec4 share, vec2 uv, float within
 #endif
         } else {
             vec3 tilt = view.normal - n;
-            mirrored = mirrored_light(entity, sqrt(view.alpha * view.alpha + dot(tilt, tilt)));
+            mirrored = mirrored_light(entity, mirror, sqrt(view.alpha * view.alpha + dot(tilt, tilt)));
         }
         through = mix(through, vec3((1.0 - mirrored.a) * entity.sky_scale), of_mirror);
         nearby = mix(nearby, mirrored.rgb, of_mirror);

@@ -180,18 +180,25 @@ shared_struct! {
         factors: [f32; 4],
         /// What the texels of its emission are multiplied by.
         glow: [f32; 4],
-        /// The plane that mirrors, by the world's axes from the eye: unit normal and offset.
-        mirror_plane: [f32; 4],
-        /// From pixels to places on the picture of mirrors: factors on both, and what is added to the first. The share
-        /// of the mirror's picture in what its surface reflects.
-        mirror_place: [f32; 4],
-        /// Left edge of the mirror's part of that picture, and one behind its right one, texels. Radius in texels of a
-        /// lobe of slope 1. Factor on what depth leaves of 1, over that of a pixel's view depth, that gives the share of
-        /// the way from the mirror's eye that lies behind the mirror.
+        /// Planes that mirror, one in each column, by the world's axes from the eye: unit normals and offsets. Zeros
+        /// where there are fewer.
+        mirror_x: [f32; 4],
+        mirror_y: [f32; 4],
+        mirror_z: [f32; 4],
+        mirror_offset: [f32; 4],
+        /// Left edge of each mirror's part of the picture of mirrors, texels.
+        mirror_left: [f32; 4],
+        /// Factor of each on what depth leaves of 1, over that of a pixel's view depth, that gives the share of the way
+        /// from the mirror's eye that lies behind the mirror.
+        mirror_behind: [f32; 4],
+        /// Share of each mirror's picture in what its surface reflects.
+        mirror_share: [f32; 4],
+        /// From pixels to places in a part: factors on both, in texels. Width of a part, texels. Radius in texels of a
+        /// lobe of slope 1.
         mirror_view: [f32; 4],
         /// Of a curved surface, which has no plane: the place of its probe from the eye by the world's axes, and the edge
-        /// of one of six pictures in texels. Its view is the left edge of its part, as above the radius of a lobe, and the
-        /// distance of the pictures' near plane, metres.
+        /// of one of six pictures in texels. The first mirror's numbers are the probe's; it is behind by the distance of
+        /// the pictures' near plane, metres.
         probe: [f32; 4],
     }
 }

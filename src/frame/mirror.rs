@@ -21,6 +21,8 @@ use std::collections::{HashMap, HashSet};
 const MOST: usize = 4;
 /// Least share of a picture's light that a mirror reflects: of the pixels, times the reflectance.
 const LEAST_SHARE: f64 = 5e-4;
+/// The same for a mirror of entities that are better ones already.
+const LEAST_SHARE_AGAIN: f64 = 4e-3;
 /// Least share of a mesh's surface in a face that may be a mirror, and how many faces of a mesh may be.
 const LEAST_FACE: f64 = 0.04;
 const MOST_FACES: usize = 8;
@@ -258,9 +260,11 @@ impl Frame {
         }
         found.retain(|(.., score)| *score > 0.0);
         found.sort_by(|(_, _, a), (_, _, b)| b.total_cmp(a));
-        // An entity is one mirror, the one that is seen best.
+        // An entity is more than one mirror where each of them is seen well.
         let mut taken = HashSet::new();
-        found.iter_mut().for_each(|(_, entities, _)| entities.retain(|entity| taken.insert(*entity)));
+        found.iter_mut().for_each(|(_, entities, score)| {
+            entities.retain(|entity| taken.insert(*entity) || *score > LEAST_SHARE_AGAIN);
+        });
         found.retain(|(_, entities, _)| !entities.is_empty());
         // None comes or goes in a step.
         let least = found.get(mirrors.count()).map_or(0.0, |(.., score)| *score).max(LEAST_SHARE);
@@ -345,24 +349,29 @@ impl Frame {
         let [width, height] = self.options.size.map(f64::from);
         for (number, mirror) in self.picture.mirrors.iter().enumerate() {
             let [left, _, part_width, part_height] = of_picture.area(number).map(f64::from);
-            let across = part_width * of_picture.count() as f64;
             let focal_px = 0.5 * part_height / camera.half_height();
             for &entity in &mirror.entities {
                 let told = &mut entities[entity];
                 match &mirror.shape {
                     Shape::Plane(of) => {
                         let plane = of.plane.truncate().extend(of.plane.dot(eye.extend(1.0)));
-                        let behind = 1.0 / (of.depth_step * of.height_m);
-                        told.mirror_plane = plane.as_vec4().to_array();
-                        told.mirror_place =
-                            [part_width / across / width, 1.0 / height, left / across, mirror.share].map(|x| x as f32);
-                        told.mirror_view = [left, left + part_width, focal_px, behind].map(|x| x as f32);
+                        let rows =
+                            [&mut told.mirror_x, &mut told.mirror_y, &mut told.mirror_z, &mut told.mirror_offset];
+                        let slot = told.mirror_share.iter().position(|share| *share == 0.0).unwrap_or(MOST - 1);
+                        rows.into_iter().zip(plane.to_array()).for_each(|(row, of)| row[slot] = of as f32);
+                        told.mirror_left[slot] = left as f32;
+                        told.mirror_behind[slot] = (1.0 / (of.depth_step * of.height_m)) as f32;
+                        told.mirror_share[slot] = mirror.share as f32;
+                        told.mirror_view =
+                            [part_width / width, part_height / height, part_width, focal_px].map(|x| x as f32);
                     }
                     Shape::Probe(probe) => {
                         let side = f64::from(probe.side);
                         told.probe = (probe.centre - eye).extend(side).as_vec4().to_array();
-                        told.mirror_place = [0.0, 0.0, 0.0, mirror.share as f32];
-                        told.mirror_view = [left, 0.0, 0.5 * side * PROBE_ZOOM, probe.near_m].map(|x| x as f32);
+                        told.mirror_left[0] = left as f32;
+                        told.mirror_behind[0] = probe.near_m as f32;
+                        told.mirror_share[0] = mirror.share as f32;
+                        told.mirror_view[3] = (0.5 * side * PROBE_ZOOM) as f32;
                     }
                 }
             }

@@ -28,8 +28,8 @@ macro_rules! same_layout {
 fn glossy_entities() {
     let reflection = library().shader(&gloss_row(false, true)).unwrap().reflection;
     same_layout!(reflection, GlossEntity: row_x row_y row_z albedo roughness eye metallic lights more_lights f0 sky_scale
-        vertex_first radiosity_first vertex_count mean_energy light_count textured factors glow mirror_plane
-        mirror_place mirror_view probe);
+        vertex_first radiosity_first vertex_count mean_energy light_count textured factors glow mirror_x
+        mirror_y mirror_z mirror_offset mirror_left mirror_behind mirror_share mirror_view probe);
 }
 
 #[test]

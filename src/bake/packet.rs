@@ -101,6 +101,13 @@ pub struct BlockerHit {
     on_back: bool,
 }
 
+impl BlockerHit {
+    /// Whether the ray meets the back of a surface.
+    pub fn is_behind(&self) -> bool {
+        self.from_behind || self.on_back
+    }
+}
+
 struct Packet {
     direction: [[f32; LANES]; 3],
     inverse: [[f32; LANES]; 3],

@@ -4,7 +4,7 @@
 use super::cluster_order::cluster_order;
 use super::links::{Link, Met, RUNS, Runs, links};
 use super::own_visibility::{Counts, Eye, Front, PATTERN, Rays, Seen, Standing, Target, see};
-use super::packet::{BlockerTriangle, Blockers, Mask};
+use super::packet::{BlockerHit, BlockerTriangle, Blockers, Mask};
 use super::refine::{Limits, Refined, refine};
 use super::triangles::{distinct, weights};
 use super::visibility_volume::VolumePlan;
@@ -28,7 +28,7 @@ use std::sync::{Arc, OnceLock};
 use std::time::Instant;
 
 /// Counts in every name of the cache: another number where a bake of surfaces computes something else.
-const VERSION: u32 = 34;
+const VERSION: u32 = 35;
 /// How far towards the middle of its triangles a vertex is seen from, as a share of the way: the light of a crease is
 /// that just inside each face. Where meshes are left as they are, so are the places from which they are seen.
 const NUDGE: f32 = 0.02;
@@ -564,23 +564,24 @@ impl GroupSpace<'_> {
 
     /// Whether anything stands between two points of the member's frame.
     pub fn is_between(&self, from: Vec3, to: Vec3) -> bool {
-        self.is_cut(&self.blocks, from, to)
+        self.first_between(&self.blocks, from, to).is_some()
     }
 
-    /// The same of those members that count.
-    fn is_cut(&self, counts: &[bool], from: Vec3, to: Vec3) -> bool {
+    /// The first of those members that count.
+    fn first_between(&self, counts: &[bool], from: Vec3, to: Vec3) -> Option<BlockerHit> {
         let [from, to] = [from, to].map(|place| self.group.place(self.own().placement.point(place.as_dvec3())));
         let mut hits = Vec::with_capacity(1);
         let toward = (to - from).normalize_or_zero();
         self.group.blockers.first(from, &Mat3A::IDENTITY, &[toward], counts, &mut hits);
-        hits[0].is_some_and(|hit| hit.distance < from.distance(to))
+        hits[0].filter(|hit| hit.distance < from.distance(to))
     }
 
     /// Whether another member lies on a point, as the ground on which it stands: between it and the place from which it is
-    /// seen.
+    /// seen. One that faces the same way, as a rug in its floor's plane, is no ground.
     fn is_covered(&self, position: Vec3, normal: Vec3, nudge: Vec3) -> bool {
         let off = nudge.dot(normal) * normal;
-        self.group.plan.members.len() > 1 && self.is_cut(&self.others, position - off, position + off)
+        let cover = || self.first_between(&self.others, position - off, position + off);
+        self.group.plan.members.len() > 1 && cover().is_some_and(|hit| !hit.is_behind())
     }
 
     /// The members that are so near a cluster, given by its vertices, that its maps have their shadows.

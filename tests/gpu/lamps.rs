@@ -328,3 +328,20 @@ sun = { toward = [0.8, 0.6, 0.3], angle_deg = 1, radiance = [6000, 6000, 6000] }
     let error = picture_error(&gpu, &scene.build().unwrap());
     assert!(error < 0.05, "{error}");
 }
+
+/// A rug lies exactly in its floor's plane: neither is dark there (0.5).
+#[test]
+fn what_lies_in_a_floor_takes_no_light_from_it() {
+    let Some(gpu) = gpu() else { return };
+    let scene = Scene::builder()
+        .camera(Camera::new([0.0, 1.2, 2.6], [0.0, 0.1, 0.0]))
+        .environment(EnvironmentData { uniform: Some(Vec3::splat(0.1)), ..EnvironmentData::default() })
+        .mesh("floor", Generator::Plane { size_m: 3.0, cells: 20 })
+        .mesh("rug", Generator::Plane { size_m: 1.0, cells: 10 })
+        .mesh("lamp", Generator::Sphere { radius_m: 0.1, subdivisions: 2 })
+        .entity(EntityData::of_mesh("floor"))
+        .entity(EntityData::of_mesh("rug"))
+        .entity(shines("lamp", [0.8, 0.7, 0.0], 5.0));
+    let error = picture_error(&gpu, &scene.build().unwrap());
+    assert!(error < 0.04, "{error}");
+}

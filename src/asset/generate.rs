@@ -89,6 +89,11 @@ pub enum Generator {
 }
 
 impl Generator {
+    /// Whether its user chose how many faces it has, and not the fewest for its shape.
+    pub(crate) fn is_tessellated(&self) -> bool {
+        !matches!(self, Generator::Plane { cells: 1, .. } | Generator::Cuboid { cells: 1, .. })
+    }
+
     /// Checks the numbers and makes the mesh.
     ///
     /// # Errors

@@ -11,6 +11,7 @@ use super::visibility_volume::VolumePlan;
 use super::{BakeReport, Options, Progress, TRANSFER_OFFSET, Wanted, bakes_transfer};
 use crate::asset::Mesh;
 use crate::asset::enclose::{around_boxes, around_spheres};
+use crate::asset::generate::Generator;
 use crate::asset::grid::Grid;
 use crate::asset::mesh::Attributes;
 use crate::asset::texture::Texture;
@@ -79,8 +80,8 @@ pub struct Member {
     /// Members that shine block the view of the sky alone: before sharp lights they stand on lists.
     pub emits: bool,
     pub receives: bool,
-    /// Whether its surface may be refined: a mesh from a file, at rest. A generator's tessellation is a user's choice, and
-    /// what moves is many instances of one mesh.
+    /// Whether its surface may be refined: one at rest, as what moves is many instances of one mesh, and not one to which
+    /// a user gave finer faces than its shape needs.
     pub refines: bool,
 }
 
@@ -145,7 +146,8 @@ impl SurfacePlan {
         let member = |entity: usize, placement: Placement| {
             let of = &scene.entities[entity];
             let mesh = scene.meshes[of.mesh].clone();
-            let generated = scene.data.meshes.get(of.mesh).is_some_and(|data| data.generator.is_some());
+            let generator = scene.data.meshes.get(of.mesh).and_then(|data| data.generator.as_ref());
+            let generated = generator.is_some_and(Generator::is_tessellated);
             let refines = refinement.is_some() && of.receives && scene.is_at_rest(entity) && !generated;
             let transparent = of.transparent;
             let occludes = of.occludes && !transparent;

@@ -28,13 +28,19 @@ fn wall(position: [f32; 3]) -> EntityData {
 
 /// Relative RMS of a scene's picture against rays through its pixels, direct light alone.
 fn picture_error(gpu: &Gpu, scene: &Scene) -> f64 {
+    error_with(gpu, scene, Bounces::None)
+}
+
+fn error_with(gpu: &Gpu, scene: &Scene, bounces: Bounces) -> f64 {
     let size = [96, 64];
     let bake = bake::Options { groups: true, vertices: 20_000, ..bake::Options::default() };
-    let options = frame::Options { size, bake, bounces: Bounces::None, ..frame::Options::default() };
+    let options = frame::Options { size, bake, bounces, ..frame::Options::default() };
     let found = gpu.picture(scene, options, f32::INFINITY);
     let placements = scene.at(0.0);
     let world = World::of(scene, &placements);
-    let rays = pixels::picture(&world, size, true, &RayCast { rays: 512, runs: 2, ..RayCast::default() }, &|_| ());
+    let bounces = u32::from(bounces != Bounces::None);
+    let cast = RayCast { rays: 512, runs: 2, bounces, ..RayCast::default() };
+    let rays = pixels::picture(&world, size, true, &cast, &|_| ());
     // The lamp itself is brighter than all that it lights.
     let pairs = found.into_iter().zip(rays.linear);
     relative_rms(pairs.filter(|(found, truth)| found.max(*truth) < 0.6))
@@ -344,4 +350,20 @@ fn what_lies_in_a_floor_takes_no_light_from_it() {
         .entity(shines("lamp", [0.8, 0.7, 0.0], 5.0));
     let error = picture_error(&gpu, &scene.build().unwrap());
     assert!(error < 0.04, "{error}");
+}
+
+/// Walls of one square each throw the light of a lamp before their middles, though their corners are dark.
+#[test]
+fn walls_of_one_square_throw_light_on_each_other() {
+    let Some(gpu) = gpu() else { return };
+    let scene = Scene::builder()
+        .camera(Camera::new([0.0, 1.0, 4.0], [0.0, 0.8, 0.0]))
+        .mesh("wall", Generator::Plane { size_m: 3.0, cells: 1 })
+        .mesh("lamp", Generator::Sphere { radius_m: 0.1, subdivisions: 2 })
+        .entity(EntityData::of_mesh("wall"))
+        .entity(EntityData { rotation: turned(Vec3::X, 90.0), ..stands("wall", [0.0, 1.5, -1.5]) })
+        .entity(EntityData { rotation: turned(Vec3::X, 180.0), ..stands("wall", [0.0, 2.2, 0.0]) })
+        .entity(shines("lamp", [0.0, 0.5, 0.0], 6.0));
+    let error = error_with(&gpu, &scene.build().unwrap(), Bounces::One);
+    assert!(error < 0.05, "{error}");
 }

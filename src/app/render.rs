@@ -33,7 +33,8 @@ pub struct Arguments {
     /// out/f_####.png
     #[arg(short, long, value_name = "P.png")]
     output: PathBuf,
-    /// Also write linear f32 radiance: of every picture when the name has a run of #, else of the last
+    /// Also write linear f32 radiance, at most 65 504 where no ray is cast: of every picture when the name has a run of #,
+    /// else of the last
     #[arg(long, value_name = "P.exr")]
     exr: Option<PathBuf>,
     /// Number of pictures

@@ -18,6 +18,8 @@ const NEARLY_WHITE: f64 = 0.8;
 const MIDDLE: f64 = 0.1;
 /// Largest further brightening, stops.
 const EXTRA_EV: f64 = 2.0;
+/// Value that the background gets at most where it fills half of the picture or more: what is dark before it stays so.
+const BACKGROUND: f64 = 2.0;
 /// Exposures are multiples of this, stops.
 const STEP_EV: f64 = 0.25;
 
@@ -47,8 +49,11 @@ pub fn exposure_ev(scene: &Scene, time_s: f64, aspect: f64) -> Option<f32> {
     let cast = RayCast { rays: RAYS, runs: 1, ..RayCast::default() };
     let lit = cast.run_at(&world, &points);
     let brightest = |rgb: [f64; 3]| rgb.into_iter().fold(0.0, f64::max);
-    of_values(lit.iter().map(|estimate| brightest(estimate.radiosity)).collect())
-        .or_else(|| of_values(seen.iter().map(|(_, seen)| brightest(seen.emission.to_array())).collect()))
+    let found = of_values(lit.iter().map(|estimate| brightest(estimate.radiosity)).collect())
+        .or_else(|| of_values(seen.iter().map(|(_, seen)| brightest(seen.emission.to_array())).collect()))?;
+    let background = brightest(scene.environment.mean().to_array());
+    let most_ev = if 2 * seen.len() as u32 <= size[0] * size[1] { (BACKGROUND / background).log2() } else { 32.0 };
+    Some(found.min(in_steps(most_ev)))
 }
 
 /// The exposure that suits radiances: bright ones become nearly white, and where that leaves most of them dark, more of
@@ -61,7 +66,11 @@ fn of_values(mut values: Vec<f64>) -> Option<f32> {
     let bright_ev = (NEARLY_WHITE / bright).log2();
     let middle_ev = (MIDDLE / at(0.5)?).log2();
     let ev = middle_ev.clamp(bright_ev, bright_ev + EXTRA_EV);
-    Some(((ev / STEP_EV).round() * STEP_EV).clamp(-32.0, 32.0) as f32)
+    Some(in_steps(ev))
+}
+
+fn in_steps(ev: f64) -> f32 {
+    ((ev / STEP_EV).round() * STEP_EV).clamp(-32.0, 32.0) as f32
 }
 
 #[cfg(test)]
@@ -85,17 +94,21 @@ mod tests {
 
     #[test]
     fn pictures_of_any_light_are_neither_black_nor_white() {
-        let ev = |radiance: f32| {
+        let ev_of = |radiance: f32, size_m: f32, albedo: f32| {
             let text = format!(
                 "[camera]\neye = [0, 2, 5]\ntarget = [0, 0, 0]\n[environment]\nuniform = [{radiance}, 0, 0]\n\
-                 [[mesh]]\nname = \"floor\"\nplane = {{ size_m = 9, cells = 2 }}\n[[entity]]\nmesh = \"floor\"\n"
+                 [[mesh]]\nname = \"floor\"\nplane = {{ size_m = {size_m}, cells = 2 }}\n[[entity]]\nmesh = \"floor\"\n\
+                 albedo = [{albedo}, {albedo}, {albedo}]\n"
             );
             let read = |_: &Path| unreachable!("no files");
             exposure_ev(&Scene::parse(&text, Path::new("s.toml"), &read).unwrap(), 0.0, 1.5)
         };
+        let ev = |radiance: f32| ev_of(radiance, 9.0, 0.7);
         // A floor of albedo 0.7 in the open.
         assert_eq!(ev(1.0), Some(0.25));
         assert_eq!(ev(1024.0), Some(0.25 - 10.0));
         assert_eq!(ev(0.0), None);
+        // A small black thing stays dark, and the sky behind it is not far beyond white.
+        assert_eq!(ev_of(8.0, 1.0, 0.001), Some(-2.0));
     }
 }

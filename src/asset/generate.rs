@@ -8,7 +8,6 @@ use serde::{Deserialize, Serialize};
 
 use super::mesh::{COORDINATE_LIMIT_M, Mesh, TRIANGLE_LIMIT};
 use super::panel;
-pub use super::teapot::teapot;
 use crate::error::{Error, Result};
 
 /// Largest number of times that an icosahedron's triangles are divided: 1.3 million triangles.
@@ -80,12 +79,6 @@ pub enum Generator {
         /// Edge lengths in metres along x and z.
         size_m: [f32; 2],
     },
-    /// Martin Newell's teapot: y up, base on y = 0, spout towards +x, 6.5 m from handle to spout and 2.4 m high. It is
-    /// not closed.
-    Teapot {
-        /// Squares along an edge of each of the 32 patches.
-        subdivisions: u32,
-    },
 }
 
 impl Generator {
@@ -100,7 +93,7 @@ impl Generator {
     /// [`Error::Input`], one line, where a length is not positive and finite or a count is zero or makes too many
     /// triangles.
     pub fn build(&self) -> Result<Mesh> {
-        use Generator::{Cuboid, Disc, Plane, Rectangle, Sphere, Teapot, Torus, TorusTwoColour};
+        use Generator::{Cuboid, Disc, Plane, Rectangle, Sphere, Torus, TorusTwoColour};
         let square = |n: u32| u64::from(n).pow(2);
         let (lengths, counts, triangles) = match *self {
             Plane { size_m, cells } => (vec![size_m], vec![cells], square(cells).saturating_mul(2)),
@@ -122,7 +115,6 @@ impl Generator {
             Cuboid { size_m, cells } => (size_m.to_array().to_vec(), vec![cells], square(cells).saturating_mul(12)),
             Disc { radius_m } => (vec![radius_m], vec![], 0),
             Rectangle { size_m } => (size_m.to_vec(), vec![], 0),
-            Teapot { subdivisions } => (vec![], vec![subdivisions], square(subdivisions).saturating_mul(64)),
         };
         if lengths.iter().any(|l| !(1e-7..=COORDINATE_LIMIT_M / 2.0).contains(l)) {
             return Err(Error::Input(format!("a length is not within 1e-7 to {:e} m", COORDINATE_LIMIT_M / 2.0)));
@@ -145,7 +137,6 @@ impl Generator {
             Cuboid { size_m, cells } => cuboid(size_m, cells),
             Disc { radius_m } => panel::disc(radius_m)?,
             Rectangle { size_m } => panel::rectangle(size_m)?,
-            Teapot { subdivisions } => teapot(subdivisions),
         })
     }
 }

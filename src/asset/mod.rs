@@ -32,7 +32,6 @@ mod peak;
 pub mod picture;
 pub mod pierce;
 pub mod sky;
-mod teapot;
 pub mod texture;
 pub mod topology;
 

@@ -188,7 +188,7 @@ impl Sight {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::asset::generate::{cuboid, plane, sphere, teapot, torus};
+    use crate::asset::generate::{cuboid, plane, sphere, torus};
     use crate::bake::chunk::morton;
     use glam::dcamera::rh::{proj::vulkan, view};
 
@@ -196,8 +196,7 @@ mod tests {
     /// found.
     #[test]
     fn nothing_that_is_seen_is_called_unseen() {
-        let meshes =
-            [sphere(1.0, 4), torus(1.0, 0.3, 96, 48), cuboid(Vec3::new(1.0, 2.0, 0.5), 24), plane(3.0, 60), teapot(6)];
+        let meshes = [sphere(1.0, 4), torus(1.0, 0.3, 96, 48), cuboid(Vec3::new(1.0, 2.0, 0.5), 24), plane(3.0, 60)];
         let mut rng = fastrand::Rng::with_seed(9);
         for mesh in &meshes {
             let (centre, radius_m) = mesh.bounding_sphere();

@@ -24,7 +24,7 @@
 //! file = "wood.png"
 //! [[mesh]]
 //! name = "ball"
-//! sphere = { radius_m = 0.5, subdivisions = 4 }  # or plane, cuboid, torus, torus_two_colour, teapot, disc, rectangle
+//! sphere = { radius_m = 0.5, subdivisions = 4 }  # or plane, cuboid, torus, torus_two_colour, disc, rectangle
 //! [[entity]]
 //! mesh = "ball"
 //! position = [0, 0.6, 0]

@@ -9,7 +9,7 @@
 pub use shadow_fields::asset::generate;
 
 use glam::{DVec3, Vec3};
-use shadow_fields::asset::Mesh;
+use shadow_fields::asset::{Mesh, embedded};
 use shadow_fields::bake::cache::Cache;
 use shadow_fields::bake::{self, Baker};
 use shadow_fields::farm::{Film, Input, Plan};
@@ -43,6 +43,12 @@ pub fn skip(reason: &str) {
 #[allow(clippy::print_stderr)]
 pub fn report(line: &str) {
     eprintln!("{line}");
+}
+
+/// The built-in teapot, which is open.
+pub fn teapot() -> Mesh {
+    let path = Path::new("assets/meshes/teapot.obj");
+    Mesh::parse(&embedded::read(path).unwrap(), path).unwrap()
 }
 
 /// The zonal coefficients of a cap about +z whose half angle has the cosine `c`: 1 inside, 0 outside.

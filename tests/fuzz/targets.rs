@@ -55,7 +55,7 @@ const TOML: &str = "\
     exposure_ev = |time_s = |strength = |turn_deg = |uniform = |gradient = { radiance = |key = { radiance = |\
     sky = { turbidity = |image = { file = \"sky.hdr\" }\n|name = \"m\"\n|file = \"m.obj\"\n|\
     plane = { size_m = 1, cells = 2 }\n|sphere = { radius_m = 1, subdivisions = 1 }\n|\
-    teapot = { subdivisions = 1 }\n|mesh = \"m\"\n|position = |rotation = |scale = |albedo = |emission = |\
+    disc = { radius_m = 1 }\n|mesh = \"m\"\n|position = |rotation = |scale = |albedo = |emission = |\
     emits = true\n|motion = [|keyframes = { keys = [|orbit = |spin = |bob = |[0, 1, 0]|true|\n";
 const GLTF: &str = "\
     \"bufferView\":|\"byteOffset\":|\"byteStride\":|\"count\":|\"componentType\":|\"extensions\":{|\"attributes\":{|\

@@ -1,7 +1,7 @@
 //! Capture on the device against rays cast on the host: coverage, culling, faces left out, and colours on the right
 //! faces.
 
-use crate::common::{generate, gpu, joined};
+use crate::common::{generate, gpu, joined, teapot};
 use glam::{Quat, Vec3};
 use shadow_fields::asset::Mesh;
 use shadow_fields::bake::capture::{Capture, Model, NO_SLOT, Way};
@@ -24,7 +24,7 @@ fn scenes() -> Vec<(Mesh, Vec<Vec3>)> {
     vec![
         (generate::sphere(0.5, 3), vec![Vec3::new(0.58, -0.58, 0.58) * 1.01]),
         (generate::torus(1.0, 0.3, 48, 24), hole),
-        (generate::teapot(4), vec![Vec3::new(0.0, 0.9, 0.0), Vec3::new(0.1, 0.0, 0.05)]),
+        (teapot(), vec![Vec3::new(0.0, 0.9, 0.0), Vec3::new(0.1, 0.0, 0.05)]),
         (generate::cuboid(Vec3::new(0.4, 1.0, 0.7), 2), vec![Vec3::new(0.33, 0.0, 0.1), Vec3::new(0.0, 0.82, 0.0)]),
         (tilted_plane(), vec![Vec3::new(0.01, 0.02, 0.01), Vec3::new(-0.1, 0.6, 0.1)]),
     ]

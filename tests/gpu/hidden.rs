@@ -15,7 +15,7 @@ fn room() -> Scene {
          [[mesh]]\nname = \"ball\"\nsphere = { radius_m = 0.5, subdivisions = 4 }\n\
          [[mesh]]\nname = \"ring\"\ntorus = { major_m = 0.5, minor_m = 0.2, segments = 48, sides = 24 }\n\
          [[mesh]]\nname = \"box\"\ncuboid = { size_m = [0.8, 0.8, 0.8], cells = 12 }\n\
-         [[mesh]]\nname = \"pot\"\nteapot = { subdivisions = 5 }\n\
+         [[mesh]]\nname = \"pot\"\nfile = \"assets/meshes/teapot.obj\"\n\
          [[entity]]\nmesh = \"floor\"\n\
          [[entity]]\nmesh = \"ball\"\nposition = [-1.2, 0.6, 0]\n\
          [[entity]]\nmesh = \"ring\"\nposition = [0.2, 0.7, -0.8]\n\

@@ -1,6 +1,6 @@
 //! Silhouette fields: whole meshes against rays, and what lies between.
 
-use crate::common::{Gpu, generate, gpu, joined};
+use crate::common::{Gpu, generate, gpu, joined, teapot};
 use crate::self_visibility::light_rays;
 use glam::{DVec3, Vec3};
 use shadow_fields::asset::Mesh;
@@ -44,7 +44,7 @@ fn blocked_by_rays(shape: &RayMesh, point: DVec3, toward: DVec3, angle: f64) -> 
 fn shadows_on_a_floor_are_those_of_rays() {
     const ACROSS: usize = 48;
     let Some(gpu) = gpu() else { return };
-    for mesh in [generate::teapot(4), generate::torus(1.0, 0.3, 48, 24)] {
+    for mesh in [teapot(), generate::torus(1.0, 0.3, 48, 24)] {
         let field = bake(&gpu, &mesh, SilhouetteOptions::default());
         let shape = RayMesh::new(&mesh);
         let (centre, radius_m) = mesh.bounding_sphere();
@@ -105,7 +105,7 @@ fn receivers_and_lights_within_the_bounding_sphere_see_what_lies_between_them() 
     for (mesh, limits) in [
         (generate::torus(0.7, 0.25, 48, 24), [0.045, 0.06]),
         // Halves count off the cut, for lamps in shades; cut there, lights within a teapot's sphere err 0.040.
-        (generate::teapot(3), [0.03, 0.045]),
+        (teapot(), [0.03, 0.045]),
         (table(), [0.085, 0.1]),
         (generate::cuboid(Vec3::new(2.0, 0.01, 2.0), 4), [0.06, 0.085]),
         // Its outline is exact; that of a drawn view stays below 0.1.

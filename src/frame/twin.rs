@@ -7,11 +7,9 @@ use crate::field::cuboid::PlacedCuboid;
 use crate::field::{Area, ShadowField, self_visibility};
 use crate::gpu::Buffer;
 use crate::layout::{CLUSTER_VERTICES, Cluster, ENTRY_ENTITIES, ListEntry};
-use crate::lists::gather::{self, Candidates, Globe};
-use crate::lists::incremental::{ClusterLists, State};
-use crate::lists::scope::Scope;
+use crate::lists::gather::Globe;
 use crate::merge::twin::{MergeObject, MergeTwin};
-use crate::scene::{Entity, LightMethod, Placement, Scene};
+use crate::scene::{LightMethod, Placement};
 use crate::scene_buffers::{self, DeviceSurface};
 use crate::sh::basis::coefficient_count;
 use crate::sharp::twin::{SharpLight, SharpObject, SharpTwin, SurfacePoint};
@@ -22,9 +20,9 @@ use std::f64::consts::PI;
 impl Frame {
     /// Entities that stand on the list of any cluster of a receiver at this time, also by their boxes.
     pub fn listed(&self, placements: &[Placement], receiver: usize) -> BTreeSet<usize> {
-        let listed = self.work.lists.entities_on(&self.state(placements), receiver);
+        let lists = self.work.lists.entries_of(&self.state(placements), receiver);
         let of_box = |j: usize| j.checked_sub(placements.len()).map_or(j, |i| self.boxes[i][0]);
-        listed.into_iter().map(of_box).collect()
+        lists.into_iter().flatten().map(|entry| of_box(ListEntry::entities(entry)[0] as usize)).collect()
     }
 
     /// The CPU twin of the merge in f64: radiosity of every receiver's vertices, by entity. Reads the fields back.
@@ -51,10 +49,12 @@ impl Frame {
         }
         let state = self.state(placements);
         let mut receivers = Vec::new();
-        for index in indices(&self.scene, |e| e.receives) {
+        for index in (0..self.scene.entities.len()).filter(|&index| self.scene.entities[index].receives) {
             let mesh = self.scene.surface(index);
             let surface = self.buffers.surface(index);
-            let listed = (self.options.eps > 0.0).then(|| listed(&state, &self.work.lists, index, surface));
+            let entities = |list: Vec<u32>| list.into_iter().map(|entry| ListEntry::entities(entry).into()).collect();
+            let lists = || self.work.lists.entries_of(&state, index).into_iter().map(entities).collect();
+            let listed = (self.options.eps > 0.0).then(lists);
             let centre_m = self.buffers.meshes[self.scene.entities[index].mesh].centre_m;
             receivers.push(Receiver {
                 index,
@@ -318,22 +318,4 @@ fn cluster_of(surface: &DeviceSurface) -> Vec<usize> {
         cluster_of[v as usize] = place / CLUSTER_VERTICES as usize;
     }
     cluster_of
-}
-
-fn listed(state: &State, lists: &ClusterLists, receiver: usize, surface: &DeviceSurface) -> Listed {
-    let scene_bounds = &state.scene_bounds;
-    let entity = &state.entities[receiver];
-    let candidates = Candidates::all(scene_bounds, receiver as u32);
-    let of_cluster = |(bounds, near): (_, &[u32])| {
-        let mut entries = Vec::new();
-        let scope = Scope::new(scene_bounds, receiver, entity, bounds, near);
-        gather::gather(&scope, &candidates, &mut entries);
-        entries.into_iter().map(|entry| ListEntry::entities(entry).into()).collect()
-    };
-    surface.clusters.iter().zip(lists.near_of(receiver)).map(of_cluster).collect()
-}
-
-/// Entities that satisfy a condition.
-fn indices(scene: &Scene, condition: impl Fn(&Entity) -> bool) -> Vec<usize> {
-    (0..scene.entities.len()).filter(|&i| condition(&scene.entities[i])).collect()
 }

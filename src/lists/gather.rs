@@ -13,7 +13,7 @@
 pub use crate::layout::GROUP_CLUSTERS;
 use crate::layout::{self, ListEntry};
 pub use crate::lists::scene_bounds::{
-    ClusterBounds, EntityBounds, Globe, ListLight, Occludes, OutlineShape, OutlineView, SceneBounds, distance_key,
+    ClusterBounds, EntityBounds, Globe, Occludes, OutlineShape, OutlineView, SceneBounds, distance_key,
 };
 use crate::lists::scope::{CullResult, Scope, SphereView};
 
@@ -29,7 +29,7 @@ pub struct Candidates {
     /// Occluders in the order in which they are multiplied ([`SceneBounds::order`]), the receiver left out.
     occluders: Vec<u32>,
     /// Lights in the order of entities, the receiver left out.
-    lights: Vec<ListLight>,
+    lights: Vec<u32>,
 }
 
 impl Candidates {
@@ -38,18 +38,18 @@ impl Candidates {
         let scope = Scope::new(scene, receiver as usize, entity, bounds, &[]);
         let mut occluders = Vec::new();
         scene.tree.find(|crowd| scope.leaves_out(crowd), |j| occluders.push(j));
-        Self::new(scene, receiver, occluders, |light| scope.may_list(light.entity as usize))
+        Self::new(scene, receiver, occluders, |light| scope.may_list(light as usize))
     }
 
     pub fn all(scene: &SceneBounds, receiver: u32) -> Self {
         Self::new(scene, receiver, scene.occluders.clone(), |_| true)
     }
 
-    fn new(scene: &SceneBounds, receiver: u32, mut occluders: Vec<u32>, keeps: impl Fn(&ListLight) -> bool) -> Self {
+    fn new(scene: &SceneBounds, receiver: u32, mut occluders: Vec<u32>, keeps: impl Fn(u32) -> bool) -> Self {
         occluders.retain(|&j| j != receiver);
         occluders.sort_by_cached_key(|&j| scene.order(receiver, j));
-        let lights = scene.lights.iter().filter(|light| light.entity != receiver && keeps(light));
-        Candidates { occluders, lights: lights.copied().collect() }
+        let lights = scene.lights.iter().copied().filter(|&light| light != receiver && keeps(light));
+        Candidates { occluders, lights: lights.collect() }
     }
 
     pub fn occluder_count(&self) -> usize {
@@ -65,7 +65,7 @@ pub fn gather(scope: &Scope<'_>, candidates: &Candidates, out: &mut Vec<u32>) ->
     let spheres = &scope.scene.spheres;
     let views: Vec<SphereView> = candidates.occluders.iter().map(|&j| scope.view_of(j as usize)).collect();
     // What becomes of each occluder in a light's chain.
-    let chain = |light: Option<(u32, &SphereView)>, sharp, radiance: f32, results: &mut Vec<CullResult>| {
+    let chain = |light: Option<(u32, &SphereView)>, sharp, radiance: f64, results: &mut Vec<CullResult>| {
         let (light, light_view) = light.unzip();
         results.clear();
         results.extend(candidates.occluders.iter().zip(&views).map(|(&occluder, view)| {
@@ -110,9 +110,9 @@ pub fn gather(scope: &Scope<'_>, candidates: &Candidates, out: &mut Vec<u32>) ->
             }
         };
     let mut results = Vec::with_capacity(views.len());
-    for light in &candidates.lights {
-        let entity = light.entity;
-        let view = scope.view(spheres[light.entity as usize]);
+    for &entity in &candidates.lights {
+        let light = &scope.scene.entities[entity as usize];
+        let view = scope.view(spheres[entity as usize]);
         let channels = if light.coloured { 3 } else { 1 };
         let sharp = light.sharp;
         if !scope.may_light(light, &view) {

@@ -13,7 +13,6 @@ use crate::lists::sight::{Sight, TriangleRun};
 use crate::scene::Placement;
 use glam::Vec3;
 use rayon::prelude::*;
-use std::collections::BTreeSet;
 use std::ops::Range;
 
 /// All that cluster lists and merge depend on at one time.
@@ -412,16 +411,18 @@ impl ClusterLists {
         (places, all)
     }
 
-    /// Entities on the lists of a receiver's clusters at a time.
-    pub fn entities_on(&self, state: &State, receiver: usize) -> BTreeSet<usize> {
-        let mut entries = Vec::new();
+    /// The entries of each of a receiver's clusters at a time.
+    pub fn entries_of(&self, state: &State, receiver: usize) -> Vec<Vec<u32>> {
+        let mut lists = Vec::new();
         for group in self.groups.iter().filter(|group| group.receiver == receiver) {
             let candidates = Self::candidates(state, group);
             for cluster in group.clusters.clone() {
+                let mut entries = Vec::new();
                 gather::gather(&self.scope(state, receiver, cluster), &candidates, &mut entries);
+                lists.push(entries);
             }
         }
-        entries.into_iter().map(|entry| ListEntry::entities(entry)[0] as usize).collect()
+        lists
     }
 }
 

@@ -15,7 +15,7 @@ use std::sync::Arc;
 
 /// Angle by which cones are widened: their cosines are stored in f32, which near 1 tells angles apart by 0.00035 rad
 /// only.
-const CONE_ROUNDING_RAD: f64 = 1e-3;
+pub(super) const CONE_ROUNDING_RAD: f64 = 1e-3;
 
 /// Where a cluster's vertices are and where they face, in its mesh's frame: metres from the bounding sphere's centre.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -133,20 +133,6 @@ pub struct Globe {
     pub placement: Placement,
 }
 
-/// A light as the gather sees it.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct ListLight {
-    /// Axis (world) and cosine of the half-angle, with `CONE_ROUNDING_RAD`, of the cone of a spot; cosine -2 where it
-    /// shines all round.
-    pub facing: [f32; 4],
-    /// Largest radiance that it shines with, of any colour.
-    pub radiance: f32,
-    pub entity: u32,
-    /// Whether it shines through a radiance field of three channels.
-    pub coloured: bool,
-    pub sharp: bool,
-}
-
 /// What the lists are made from at one time.
 pub struct SceneBounds {
     /// Those of the scene, and then the boxes of some of them.
@@ -159,18 +145,18 @@ pub struct SceneBounds {
     pub tree: Tree,
     pub occluders: Vec<u32>,
     /// Those that shine, the sharp ones first, each in the order of entities.
-    pub lights: Vec<ListLight>,
+    pub lights: Vec<u32>,
     /// Largest radiance of distant light, if there is any.
-    pub sky: Option<f32>,
+    pub sky: Option<f64>,
     /// Radiance of the brightest light, distant or not.
-    pub brightest: f32,
+    pub brightest: f64,
     pub skip: Skip,
     /// Which entities never move against each other; `None` where each is alone.
     pub groups: Option<Groups>,
     /// What all that rests blocks where other things move.
     pub volume: Option<Arc<SceneVolume>>,
     /// Radiance below which a contribution is left off; 0 leaves nothing off.
-    pub eps: f32,
+    pub eps: f64,
 }
 
 impl SceneBounds {
@@ -186,20 +172,11 @@ impl SceneBounds {
         let spheres: Vec<[f32; 4]> = entities.iter().map(sphere).collect();
         let occluders: Vec<u32> =
             (0..entities.len()).filter(|&j| entities[j].occludes != Occludes::Nothing).map(|j| j as u32).collect();
-        let lights = entities.iter().enumerate().filter(|(_, entity)| entity.emits).map(|(j, entity)| ListLight {
-            facing: entity.facing.map_or([0.0, 0.0, 0.0, -2.0], |(axis, half_angle)| {
-                axis.as_vec3().extend((half_angle + CONE_ROUNDING_RAD).min(PI).cos() as f32).to_array()
-            }),
-            radiance: entity.radiance as f32,
-            entity: j as u32,
-            coloured: entity.coloured,
-            sharp: entity.sharp,
-        });
+        let mut lights: Vec<u32> = (0..).zip(&entities).filter(|(_, entity)| entity.emits).map(|(j, _)| j).collect();
         // The chains of sharp lights come first on every list.
-        let (sharp, others): (Vec<ListLight>, Vec<ListLight>) = lights.partition(|light| light.sharp);
-        let lights = [sharp, others].concat();
-        let sky = sky.map(|sky| sky as f32);
-        let brightest = lights.iter().map(|light| light.radiance).fold(sky.unwrap_or(0.0), f32::max);
+        lights.sort_by_key(|&j| !entities[j as usize].sharp);
+        let radiances = lights.iter().map(|&j| entities[j as usize].radiance);
+        let brightest = radiances.fold(sky.unwrap_or(0.0), f64::max);
         let tree = Tree::new(occluders.iter().map(|&j| (j, spheres[j as usize])));
         SceneBounds {
             groups: None,
@@ -212,7 +189,7 @@ impl SceneBounds {
             sky,
             brightest,
             skip,
-            eps: eps as f32,
+            eps,
             spheres,
             entities,
         }

@@ -9,10 +9,13 @@ use crate::field::silhouette::{INSIDE, REACH, Side};
 use crate::field::sub_light::NEAR_LIGHT_STEPS;
 use crate::field::visibility_volume::SceneVolume;
 use crate::layout::{self, COSINE_LOBE, EVERYTHING};
-use crate::lists::scene_bounds::{ClusterBounds, EntityBounds, Globe, ListLight, Occludes, OutlineShape, SceneBounds};
+use crate::lists::scene_bounds::{
+    CONE_ROUNDING_RAD, ClusterBounds, EntityBounds, Globe, Occludes, OutlineShape, SceneBounds,
+};
 use crate::lists::skip::{CAP_SINES, SKIP_FADE_RAD};
 use crate::lists::tree::Crowd;
 use glam::{DVec2, DVec3};
+use std::f64::consts::PI;
 
 /// What an outline's distance may be off by, in r: more than the step of a map and what blending four of them errs by.
 const OUTLINE_MARGIN: f64 = 0.06;
@@ -259,23 +262,22 @@ impl<'m> Scope<'m> {
     }
 
     /// Whether a light may reach a vertex: it stands above the horizon, shines to this side, and brings enough.
-    pub fn may_light(&self, light: &ListLight, view: &SphereView) -> bool {
+    pub fn may_light(&self, light: &EntityBounds, view: &SphereView) -> bool {
         if view.below {
             return false;
         }
-        let [x, y, z, cosine] = light.facing.map(f64::from);
-        if cosine >= -1.0 && view.nearest > 0.0 {
-            let away = -view.toward.dot(DVec3::new(x, y, z));
-            if away < Angle::of_cosine(cosine).plus(view.turn).cosine {
+        if let Some((axis, half_angle)) = light.facing.filter(|_| view.nearest > 0.0) {
+            let cone = Angle::of_cosine((half_angle + CONE_ROUNDING_RAD).min(PI).cos());
+            if -view.toward.dot(axis) < cone.plus(view.turn).cosine {
                 return false;
             }
         }
-        self.is_enough(f64::from(light.radiance) * view.weight)
+        self.is_enough(light.radiance * view.weight)
     }
 
     /// Whether the radiosity that goes with an irradiance is not bounded below eps.
     fn is_enough(&self, radiance: f64) -> bool {
-        self.reflectance * radiance >= self.scene.eps.into()
+        self.reflectance * radiance >= self.scene.eps
     }
 
     /// Whether an occluder may take light in the chain of a light (`None`: of the sky). It takes at most what comes from
@@ -283,8 +285,7 @@ impl<'m> Scope<'m> {
     ///
     /// Before a sharp light an occluder counts where any part of it may be nearer than any part of the light's middle
     /// plane, and where their cones meet, without the fade that bands need.
-    pub fn may_block(&self, view: &SphereView, light: Option<&SphereView>, sharp: bool, radiance: f32) -> bool {
-        let radiance = f64::from(radiance);
+    pub fn may_block(&self, view: &SphereView, light: Option<&SphereView>, sharp: bool, radiance: f64) -> bool {
         if view.below {
             return false;
         }
@@ -369,7 +370,7 @@ impl<'m> Scope<'m> {
     /// Whether no member of a crowd matters to any cluster within the bounds: their weight under the brightest light is
     /// negligible.
     pub fn leaves_out(&self, crowd: &Crowd) -> bool {
-        !self.is_enough(self.crowd_weight(crowd) * f64::from(self.scene.brightest))
+        !self.is_enough(self.crowd_weight(crowd) * self.scene.brightest)
     }
 
     /// The same for light that its members reflect: each takes less of the view than counts.
@@ -414,15 +415,16 @@ impl<'m> Scope<'m> {
         let scene = self.scene;
         let occludes = scene.entities[index].occludes;
         let view = self.view_of(index);
-        let blocks = |light: Option<&SphereView>, sharp, radiance: f32| {
+        let blocks = |light: Option<&SphereView>, sharp, radiance: f64| {
             occludes.stands_before(sharp) && !self.is_own(index, sharp) && self.may_block(&view, light, sharp, radiance)
         };
-        let mut lights = scene.lights.iter().filter(|light| light.entity != receiver);
+        let mut lights = scene.lights.iter().map(|&light| light as usize).filter(|&light| light != receiver as usize);
         scene.sky.is_some_and(|sky| blocks(None, false, sky))
             || lights.any(|light| {
-                let light_view = self.view(scene.spheres[light.entity as usize]);
-                self.may_light(light, &light_view)
-                    && (light.entity as usize == index || blocks(Some(&light_view), light.sharp, light.radiance))
+                let light_view = self.view(scene.spheres[light]);
+                let EntityBounds { sharp, radiance, .. } = scene.entities[light];
+                self.may_light(&scene.entities[light], &light_view)
+                    && (light == index || blocks(Some(&light_view), sharp, radiance))
             })
     }
 }
@@ -450,7 +452,6 @@ mod tests {
 
     #[test]
     fn angles_add_up_to_half_a_turn() {
-        use std::f64::consts::PI;
         let mut rng = fastrand::Rng::with_seed(6);
         for _ in 0..10_000 {
             let a = PI * rng.f64();

@@ -122,11 +122,3 @@ fn run(cli: &Cli) -> Result<()> {
         Subcommands::Farm(arguments) => farm::run(&cli.global, arguments),
     }
 }
-
-#[cfg(test)]
-mod tests {
-    #[test]
-    fn command_line_is_consistent() {
-        <super::Cli as clap::CommandFactory>::command().debug_assert();
-    }
-}

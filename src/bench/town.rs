@@ -71,18 +71,3 @@ pub fn moved(place: &Placement, time_s: f64) -> Placement {
     let rotation = (Quat::from_rotation_y((0.3 * time_s) as f32) * place.rotation).normalize();
     Placement { position, rotation, scale: place.scale }
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_town_has_what_it_is_asked_for() {
-        for (things, lights) in [(1, 0), (1, 1), (64, 16), (4095, 64)] {
-            let scene = Town { things, lights, cells: 8, receive: true }.scene().unwrap();
-            assert_eq!(scene.entities.len(), things + 1);
-            assert_eq!(scene.entities.iter().filter(|e| e.emits).count(), lights);
-            assert_eq!(scene.entities.iter().filter(|e| e.receives).count(), things + 1 - lights);
-        }
-    }
-}

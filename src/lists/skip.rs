@@ -123,18 +123,3 @@ pub const CAP_SINES: [f64; 2] = [0.21, 0.27];
 /// Mean square distance from the middle of what an occluder covers, per solid angle and pi: 0.5 for a disc, 0.52 for a
 /// cube, 0.69 and 0.67 for torus and teapot.
 pub const CAP_SPREAD: f64 = 0.58;
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn every_switch_can_be_named() {
-        for row in TABLE.iter() {
-            let mut only = Skip::NONE;
-            *only.switch(row.name).unwrap() = true;
-            assert_eq!(row.name.parse(), Ok(only));
-        }
-        assert!("facing".parse::<Skip>().unwrap_err().contains("horizon, cones, behind"), "always on");
-    }
-}

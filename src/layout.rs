@@ -1,5 +1,5 @@
 //! Data that Rust and GLSL share: structs, of which the GLSL text and its readers are generated from the Rust fields,
-//! and constants. `tests/gpu/layouts.rs` compares names and offsets with the compiled shaders.
+//! and constants.
 
 use ash::vk;
 use bytemuck::{Pod, Zeroable};
@@ -36,7 +36,8 @@ struct SharedField {
     size_bytes: usize,
 }
 
-/// Declares a struct whose fields both languages have, and lists them for the generated GLSL.
+/// Declares a struct whose fields both languages have, and lists them for the generated GLSL. That would put a field
+/// elsewhere which is not aligned to its size, or to a power of two above it.
 macro_rules! shared_struct {
     ($(#[$meta:meta])* $name:ident { $($(#[$doc:meta])* $field:ident: $kind:ty),* $(,)? }) => {
         $(#[$meta])*
@@ -54,6 +55,11 @@ macro_rules! shared_struct {
                 size_bytes: size_of::<$kind>(),
             }),*];
         }
+
+        const _: () = {
+            $(let alignment = size_of::<$kind>().next_power_of_two();
+            assert!(std::mem::offset_of!($name, $field) % alignment == 0 && size_of::<$name>() % alignment == 0);)*
+        };
     };
 }
 

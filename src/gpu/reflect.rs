@@ -1,11 +1,10 @@
-//! Reflection of a SPIR-V module: bindings, push constants, local size, vertex inputs and the
-//! layout of every struct.
+//! Reflection of a SPIR-V module: bindings, push constants, local size and vertex inputs.
 
 use crate::error::{Error, Result};
 use ash::vk;
 use rspirv::dr::{Instruction, Module, Operand, load_words};
 use rspirv::spirv::{BuiltIn, Decoration, Dim, ExecutionMode, Op, StorageClass};
-use std::collections::{BTreeMap, HashMap};
+use std::collections::HashMap;
 
 /// One binding of descriptor set 0.
 #[derive(Clone, Debug)]
@@ -28,9 +27,6 @@ pub struct VertexInput {
     pub components: u32,
 }
 
-/// Byte offsets of a struct's members, by name, in order of declaration.
-pub type StructLayout = Vec<(String, u32)>;
-
 #[derive(Clone, Debug, Default)]
 pub struct Reflection {
     /// Bindings that the module declares, by index.
@@ -42,10 +38,6 @@ pub struct Reflection {
     pub local_size: [u32; 3],
     /// Vertex inputs by location; empty for other stages.
     pub inputs: Vec<VertexInput>,
-    /// Struct name to member offsets.
-    pub structs: BTreeMap<String, StructLayout>,
-    /// Struct name to the stride of arrays of it, where the module has such an array.
-    pub strides: BTreeMap<String, u32>,
 }
 
 impl Reflection {
@@ -75,7 +67,6 @@ pub(super) struct Reader<'m> {
     module: &'m Module,
     definitions: HashMap<u32, &'m Instruction>,
     names: HashMap<u32, &'m str>,
-    member_names: HashMap<(u32, u32), &'m str>,
 }
 
 fn id(operand: &Operand) -> u32 {
@@ -94,22 +85,14 @@ fn literal(operand: Option<&Operand>) -> u32 {
 
 impl<'m> Reader<'m> {
     pub(super) fn new(module: &'m Module) -> Self {
-        let mut names = HashMap::new();
-        let mut member_names = HashMap::new();
-        for instruction in &module.debug_names {
-            match (instruction.class.opcode, &instruction.operands[..]) {
-                (Op::Name, [target, Operand::LiteralString(name)]) => {
-                    names.insert(id(target), name.as_str());
-                }
-                (Op::MemberName, [target, Operand::LiteralBit32(member), Operand::LiteralString(name)]) => {
-                    member_names.insert((id(target), *member), name.as_str());
-                }
-                _ => {}
-            }
-        }
+        let named = |instruction: &'m Instruction| match (instruction.class.opcode, &instruction.operands[..]) {
+            (Op::Name, [target, Operand::LiteralString(name)]) => Some((id(target), name.as_str())),
+            _ => None,
+        };
+        let names = module.debug_names.iter().filter_map(named).collect();
         let definitions =
             module.types_global_values.iter().filter_map(|i| i.result_id.map(|result| (result, i))).collect();
-        Reader { module, definitions, names, member_names }
+        Reader { module, definitions, names }
     }
 
     fn name(&self, target: u32) -> &'m str {
@@ -141,15 +124,8 @@ impl<'m> Reader<'m> {
         let mut out = Reflection { local_size: [1; 3], ..Default::default() };
         for instruction in &self.module.types_global_values {
             let Some(result) = instruction.result_id else { continue };
-            match instruction.class.opcode {
-                Op::TypeStruct => self.structure(result, instruction, &mut out),
-                Op::TypeArray | Op::TypeRuntimeArray => {
-                    if let Some(stride) = self.decoration(result, Decoration::ArrayStride) {
-                        out.strides.insert(self.name(id(&instruction.operands[0])).to_owned(), literal(stride.first()));
-                    }
-                }
-                Op::Variable => self.variable(result, instruction, &mut out)?,
-                _ => {}
+            if instruction.class.opcode == Op::Variable {
+                self.variable(result, instruction, &mut out)?;
             }
             let is_size = instruction.class.opcode == Op::SpecConstantComposite
                 && matches!(
@@ -165,23 +141,9 @@ impl<'m> Reader<'m> {
                 out.local_size = [literal(Some(x)), literal(Some(y)), literal(Some(z))];
             }
         }
-        out.strides.remove("");
         out.bindings.sort_by_key(|b| b.index);
         out.inputs.sort_by_key(|i| i.location);
         Ok(out)
-    }
-
-    fn structure(&self, result: u32, instruction: &Instruction, out: &mut Reflection) {
-        let layout: StructLayout = (0..instruction.operands.len() as u32)
-            .filter_map(|member| {
-                let offset = self.member_decoration(result, member, Decoration::Offset)?;
-                let name = self.member_names.get(&(result, member)).copied().unwrap_or("");
-                Some((name.to_owned(), literal(offset.first())))
-            })
-            .collect();
-        if !layout.is_empty() {
-            out.structs.insert(self.name(result).to_owned(), layout);
-        }
     }
 
     fn variable(&self, result: u32, instruction: &Instruction, out: &mut Reflection) -> Result<()> {

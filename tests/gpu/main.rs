@@ -12,7 +12,6 @@ mod flight;
 mod gloss;
 mod hidden;
 mod lamps;
-mod layouts;
 mod light;
 mod merge;
 mod project;

@@ -25,27 +25,20 @@ pub struct Arguments {
     /// Frames that are timed, after two to warm up
     #[arg(long, default_value_t = 8, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=10_000))]
     timed_frames: u32,
-    /// No animations
-    #[arg(long)]
-    no_animations: bool,
     #[command(flatten)]
     options: RenderOptions,
 }
 
-/// The scenes in the order of the table, and whether each is animated too.
-const SCENES: [(&str, bool); 7] = [
-    ("room", false),
-    ("sphere_over_plane", false),
-    ("torus_over_plane", true),
-    ("small_lights", false),
-    ("teapot_lights", false),
-    ("glowing_torus", false),
-    ("twelve_instances", true),
+/// The scenes in the order of the table.
+const SCENES: [&str; 7] = [
+    "room",
+    "sphere_over_plane",
+    "torus_over_plane",
+    "small_lights",
+    "teapot_lights",
+    "glowing_torus",
+    "twelve_instances",
 ];
-/// Pictures of an animation, and how many are shown a second: three seconds.
-const ANIMATION: (u32, u16) = (36, 12);
-/// Size of an animation's pictures.
-const ANIMATION_SIZE: [u32; 2] = [480, 320];
 
 pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
     let started = Instant::now();
@@ -54,14 +47,11 @@ pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
     crate::text::make_folder(&arguments.output)?;
     let mut written = Vec::new();
     let mut rows = Vec::new();
-    for (name, animated) in SCENES {
+    for name in SCENES {
         let scene = cases::scene(name)?.scene;
         let row = still(&context, arguments, name, &scene, &mut written, started)?;
         output::note(global, format!("{}: {:.0} ms a frame", output::shown(&written[written.len() - 1]), row.frame_ms));
         rows.push(row);
-        if animated && !arguments.no_animations {
-            written.push(animation(&context, arguments, name, &scene)?);
-        }
     }
     let origin = context.origin(global);
     if arguments.options.variant.is_none() {
@@ -161,19 +151,4 @@ fn draw(frame: &mut Frame, scene: &Scene, options: frame::Options, path: &Path) 
     let exposure_ev = scene.data.output.exposure_ev();
     frame.render(&scene.at(0.0), Some(scene.data.output.white()))?;
     picture::write_png(path, options.size[0], options.size[1], &frame.picture(), exposure_ev)
-}
-
-fn animation(context: &Context, arguments: &Arguments, name: &str, scene: &Scene) -> Result<PathBuf> {
-    let options = frame::Options { size: ANIMATION_SIZE, ..arguments.options.frame(scene)? };
-    let exposure_ev = scene.data.output.exposure_ev();
-    let mut frame = context.frame(scene, options)?;
-    let (count, fps) = ANIMATION;
-    let mut pictures = Vec::new();
-    for index in 0..count {
-        frame.render(&scene.at(f64::from(index) / f64::from(fps)), Some(scene.data.output.white()))?;
-        pictures.push(picture::encode_srgb(&frame.picture(), exposure_ev));
-    }
-    let path = arguments.output.join(format!("{name}_animation.png"));
-    picture::write_apng(&path, options.size[0], options.size[1], pictures.into_iter().map(Ok), fps)?;
-    Ok(path)
 }

@@ -1,4 +1,4 @@
-//! "draw" against its twin, which casts a ray through every sample of a picture.
+//! "draw" against its twin, which casts a ray through every sample of a picture, and "smooth" against its own.
 
 use super::CheckRow;
 use super::capture::snapping;
@@ -34,7 +34,7 @@ pub fn against_twin(frame: &mut Frame, placements: &[Placement], white: f32) -> 
 }
 
 /// Compares pictures with one kind of antialiasing, at a white and without one. Rows are those of `pass`.
-pub(super) fn compare(
+fn compare(
     baker: &Baker,
     pass: &'static str,
     antialias: Antialias,
@@ -59,4 +59,9 @@ pub(super) fn compare(
 pub fn rows(baker: &Baker, add: &mut dyn FnMut(CheckRow)) -> Result<()> {
     compare(baker, "draw", Antialias::None, add)?;
     compare(baker, "draw", Antialias::Samples, add)
+}
+
+/// Rows of "smooth".
+pub fn smooth_rows(baker: &Baker, add: &mut dyn FnMut(CheckRow)) -> Result<()> {
+    compare(baker, "smooth", Antialias::Outlines, add)
 }

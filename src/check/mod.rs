@@ -13,7 +13,6 @@ pub mod project;
 pub mod sharp;
 pub mod show;
 pub mod silhouette;
-pub mod smooth;
 
 use crate::bake::Baker;
 use crate::error::Result;
@@ -66,7 +65,7 @@ pub const PASSES: [(&str, PassCheck); 11] = [
     ("bounce", bounce::rows),
     ("gloss", gloss::rows),
     ("draw", draw::rows),
-    ("smooth", smooth::rows),
+    ("smooth", draw::smooth_rows),
     ("show", show::rows),
 ];
 

@@ -12,7 +12,7 @@ use shadow_fields::field::Storage;
 use shadow_fields::frame::{self, Frame};
 use shadow_fields::gpu::Device;
 use shadow_fields::lists::skip::Skip;
-use shadow_fields::merge::variant::{VARIANTS, Variant};
+use shadow_fields::merge::variant::Variant;
 use shadow_fields::scene::{Placement, Scene};
 use std::path::Path;
 use std::sync::Arc;
@@ -51,25 +51,13 @@ fn built_in_scenes() {
     }
 }
 
-/// Skips and lattices are compared by `check`.
+/// Variants, skips and lattices are compared by `check`.
 #[test]
-fn variants_and_bands() {
+fn other_bands() {
     let Some(gpu) = gpu() else { return };
     let scene = scene(MIXED);
     let placements = scene.at(0.0);
     let base = small();
-    let mut first: Option<Vec<Vec<[f32; 3]>>> = None;
-    for &variant in VARIANTS {
-        let mut frame = gpu.frame(&scene, frame::Options { variant: Some(variant), ..base });
-        assert_eq!(frame.variant(), variant, "the scene is small enough for each");
-        agrees(variant.name, &mut frame, &placements);
-        let light = gpu.light(&mut frame, &placements);
-        for (a, b) in light.iter().zip(first.get_or_insert_with(|| light.clone())) {
-            let (worst, brightest) = difference(a, b);
-            // The same operations, perhaps fused otherwise.
-            assert!(worst <= 2e-6 * (1.0 + brightest), "{}: {worst:e} from the first variant", variant.name);
-        }
-    }
     for bands in [2, 3, 5] {
         let bake = shadow_fields::bake::Options { bands, ..base.bake };
         agrees(&format!("{bands} bands"), &mut gpu.frame(&scene, frame::Options { bake, ..base }), &placements);

@@ -34,12 +34,7 @@ pub fn against_twin(frame: &mut Frame, placements: &[Placement], white: f32) -> 
 }
 
 /// Compares pictures with one kind of antialiasing, at a white and without one. Rows are those of `pass`.
-fn compare(
-    baker: &Baker,
-    pass: &'static str,
-    antialias: Antialias,
-    add: &mut dyn FnMut(CheckRow),
-) -> Result<()> {
+fn compare(baker: &Baker, pass: &'static str, antialias: Antialias, add: &mut dyn FnMut(CheckRow)) -> Result<()> {
     let scene = scene(MIXED)?;
     let placements = scene.at(0.0);
     let mut options = frame::Options { size: [96, 64], antialias, ..options() };

@@ -27,7 +27,7 @@ pub fn compact(clusters: &[ClusterBounds]) -> bool {
 /// What may matter to any cluster of a group.
 pub struct Candidates {
     /// Occluders in the order in which they are multiplied ([`SceneBounds::order`]), the receiver left out.
-    occluders: Vec<u32>,
+    pub occluders: Vec<u32>,
     /// Lights in the order of entities, the receiver left out.
     lights: Vec<u32>,
 }
@@ -41,19 +41,12 @@ impl Candidates {
         Self::new(scene, receiver, occluders, |light| scope.may_list(light as usize))
     }
 
-    pub fn all(scene: &SceneBounds, receiver: u32) -> Self {
-        Self::new(scene, receiver, scene.occluders.clone(), |_| true)
-    }
-
-    fn new(scene: &SceneBounds, receiver: u32, mut occluders: Vec<u32>, keeps: impl Fn(u32) -> bool) -> Self {
+    /// Of these occluders, and of those lights that `keeps` says.
+    pub fn new(scene: &SceneBounds, receiver: u32, mut occluders: Vec<u32>, keeps: impl Fn(u32) -> bool) -> Self {
         occluders.retain(|&j| j != receiver);
         occluders.sort_by_cached_key(|&j| scene.order(receiver, j));
         let lights = scene.lights.iter().copied().filter(|&light| light != receiver && keeps(light));
         Candidates { occluders, lights: lights.collect() }
-    }
-
-    pub fn occluder_count(&self) -> usize {
-        self.occluders.len()
     }
 }
 

@@ -143,7 +143,6 @@ pub struct SceneBounds {
     pub outlines: Vec<Option<OutlineView>>,
     pub globes: Vec<Globe>,
     pub tree: Tree,
-    pub occluders: Vec<u32>,
     /// Those that shine, the sharp ones first, each in the order of entities.
     pub lights: Vec<u32>,
     /// Largest radiance of distant light, if there is any.
@@ -170,21 +169,19 @@ impl SceneBounds {
     pub fn new(entities: Vec<EntityBounds>, sky: Option<f64>, skip: Skip, eps: f64) -> Self {
         let sphere = |entity: &EntityBounds| entity.centre.as_vec3().extend(entity.radius_m as f32).to_array();
         let spheres: Vec<[f32; 4]> = entities.iter().map(sphere).collect();
-        let occluders: Vec<u32> =
-            (0..entities.len()).filter(|&j| entities[j].occludes != Occludes::Nothing).map(|j| j as u32).collect();
+        let occluders = (0..).zip(&entities).filter(|(_, entity)| entity.occludes != Occludes::Nothing);
         let mut lights: Vec<u32> = (0..).zip(&entities).filter(|(_, entity)| entity.emits).map(|(j, _)| j).collect();
         // The chains of sharp lights come first on every list.
         lights.sort_by_key(|&j| !entities[j as usize].sharp);
         let radiances = lights.iter().map(|&j| entities[j as usize].radiance);
         let brightest = radiances.fold(sky.unwrap_or(0.0), f64::max);
-        let tree = Tree::new(occluders.iter().map(|&j| (j, spheres[j as usize])));
+        let tree = Tree::new(occluders.map(|(j, _)| (j, spheres[j as usize])));
         SceneBounds {
             groups: None,
             volume: None,
             outlines: Vec::new(),
             globes: Vec::new(),
             tree,
-            occluders,
             lights,
             sky,
             brightest,

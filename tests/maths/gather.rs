@@ -81,9 +81,11 @@ fn the_tree_leaves_every_list_as_it_is() {
         let crowded = Crowded::new(&mut rng, round, 200);
         let Crowded { scene_bounds, receiver, entity, clusters } = &crowded;
         let group = Candidates::of_group(scene_bounds, *receiver, entity, &ClusterBounds::union(clusters));
-        offered += group.occluder_count();
-        let everything = Candidates::all(scene_bounds, *receiver);
-        all += everything.occluder_count();
+        offered += group.occluders.len();
+        let occludes = |j: &u32| scene_bounds.entities[*j as usize].occludes != Occludes::Nothing;
+        let occluders = (0..scene_bounds.entities.len() as u32).filter(occludes).collect();
+        let everything = Candidates::new(scene_bounds, *receiver, occluders, |_| true);
+        all += everything.occluders.len();
         for bounds in clusters {
             let scope = Scope::new(scene_bounds, *receiver as usize, entity, bounds, &[]);
             let [found, expected] = [&group, &everything].map(|candidates| {

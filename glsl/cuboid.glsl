@@ -50,7 +50,9 @@ float box_blocks(Box box, vec3 along, float tangent, float limit, out float near
     vec3 turned = mix(side * cosines * inverse, vec3(0.0), parallel);
     vec3 two = mix(share * share.yzx, min(share, share.yzx), max(-turned * turned.yzx, 0.0));
     vec2 in_box = slabs(box.places - box.squares, box.places + box.squares, cosines);
-    in_box = in_box.x > in_box.y ? vec2(-NO_BOX, NO_BOX) : in_box;
+    // A ray that enters the box before the light is blocked there, wherever it would leave it.
+    float leaves = limit + NEAREST * (1.0 - clamp((limit - in_box.x) / ENTERED, 0.0, 1.0));
+    in_box = in_box.x > in_box.y ? vec2(-NO_BOX, NO_BOX) : vec2(in_box.x, min(in_box.y, leaves));
     near = mix(near, vec3(EVERYTHING), parallel);
     bool second = near.y < near.x;
     nearest = second ? near.y : near.x;

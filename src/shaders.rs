@@ -2,7 +2,7 @@
 //! text that is generated from the tables of [`crate::sh`].
 
 use crate::error::{Error, Result};
-use crate::field::cuboid::{NEAREST_EDGE, PARALLEL};
+use crate::field::cuboid::{ENTERED, NEAREST_EDGE, PARALLEL};
 use crate::field::quantity::channel_stride;
 use crate::field::self_visibility;
 use crate::field::silhouette::{LEAST_PENUMBRA, LEAST_STEP, NEAREST, NO_BOX, TOUCHING};
@@ -57,6 +57,7 @@ impl ShaderPermutation {
         self.number("NEAREST", NEAREST)
             .number("NEAREST_EDGE", NEAREST_EDGE)
             .number("PARALLEL", PARALLEL)
+            .number("ENTERED", ENTERED)
             .number("NO_BOX", NO_BOX)
             .number("TOUCHING", TOUCHING)
             .number("LEAST_STEP", LEAST_STEP)

@@ -6,12 +6,15 @@
 //! bounding radii of the box, as those of silhouette fields ([`super::silhouette`]) are, and so is the rule of what lies
 //! between a point and a light.
 
-use super::silhouette::{LEAST_PENUMBRA, NO_BOX, blocked_share, counts_between, through_box};
+use super::silhouette::{LEAST_PENUMBRA, NEAREST, NO_BOX, blocked_share, counts_between, through_box};
 use glam::DVec3;
 
 /// Square of the sine of the angle between a ray and edges within which the ray counts as parallel to them: what the
 /// strip cuts off the other two is no more than that sine.
 pub const PARALLEL: f64 = 1e-6;
+/// How far before a light, in r, a ray enters a box that blocks all of it though it would leave the box beyond: as a pole
+/// that reaches into its lamp, whose lower part it hides.
+pub const ENTERED: f64 = 0.004;
 
 /// Least distance of an edge from a receiver that a penumbra is computed for, in r. Edges are exact, so that it is less
 /// than that of maps: on a wall of several boxes the next one begins in the wall's plane.
@@ -119,7 +122,12 @@ impl Cuboid {
             a * b + ray.cosines[i].max(0.0) * (a.min(b) - a * b)
         };
         let (_, away) = ray.nearest();
-        two(0).min(two(1)).min(two(2)) * counts_between(away, distance, ray.in_box)
+        let [enters, mut leaves] = ray.in_box;
+        // A ray that enters the box before the light is blocked there, wherever it would leave it.
+        if enters > -NO_BOX {
+            leaves = leaves.min(distance + NEAREST * (1.0 - ((distance - enters) / ENTERED).clamp(0.0, 1.0)));
+        }
+        two(0).min(two(1)).min(two(2)) * counts_between(away, distance, [enters, leaves])
     }
 }
 

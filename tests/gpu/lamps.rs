@@ -367,3 +367,19 @@ fn walls_of_one_square_throw_light_on_each_other() {
     let error = error_with(&gpu, &scene.build().unwrap(), Bounces::One);
     assert!(error < 0.05, "{error}");
 }
+
+/// The top of a pole reaches into a bulb, whose lower part it hides from the wall behind (0.21).
+#[test]
+fn a_pole_hides_the_part_of_its_lamp_that_it_reaches_into() {
+    let Some(gpu) = gpu() else { return };
+    let scene = Scene::builder()
+        .camera(Camera::new([0.0, 0.6, 2.0], [0.0, 0.6, 0.0]))
+        .mesh("wall", Generator::Plane { size_m: 4.0, cells: 40 })
+        .mesh("pole", Generator::Cuboid { size_m: Vec3::new(0.03, 1.5, 0.03), cells: 1 })
+        .mesh("lamp", Generator::Sphere { radius_m: 0.03, subdivisions: 3 })
+        .entity(EntityData { rotation: turned(Vec3::X, 90.0), ..stands("wall", [0.0, 0.8, -0.4]) })
+        .entity(stands("pole", [0.0, 0.75, 0.0]))
+        .entity(shines("lamp", [0.0, 1.52, 0.0], 30.0));
+    let error = picture_error(&gpu, &scene.build().unwrap());
+    assert!(error < 0.1, "{error}");
+}

@@ -34,7 +34,8 @@ impl PixelChains {
         for (index, entity) in scene.entities.iter().enumerate() {
             let surface = buffers.surface(index);
             let fits = match &surface.drawn {
-                DrawnMesh::Grid(..) => true,
+                // Its pixels read no maps, which are bound beside what they read.
+                DrawnMesh::Grid(..) => TexelView::fits(device, vk::Format::R32G32_UINT, buffers.self_cells.size_bytes),
                 DrawnMesh::Triangles(triangles) => triangles.fits_views(device, &buffers.vertices, &buffers.self_cells),
             };
             let by_pixel = ByPixel {

@@ -375,7 +375,7 @@ fn a_pole_hides_the_part_of_its_lamp_that_it_reaches_into() {
     let scene = Scene::builder()
         .camera(Camera::new([0.0, 0.6, 2.0], [0.0, 0.6, 0.0]))
         .mesh("wall", Generator::Plane { size_m: 4.0, cells: 40 })
-        .mesh("pole", Generator::Cuboid { size_m: Vec3::new(0.03, 1.5, 0.03), cells: 1 })
+        .mesh("pole", Generator::Cuboid { size_m: Vec3::new(0.03, 1.5, 0.03), cells: 2 })
         .mesh("lamp", Generator::Sphere { radius_m: 0.03, subdivisions: 3 })
         .entity(EntityData { rotation: turned(Vec3::X, 90.0), ..stands("wall", [0.0, 0.8, -0.4]) })
         .entity(stands("pole", [0.0, 0.75, 0.0]))

@@ -23,7 +23,8 @@ use std::sync::Arc;
 const LEVELS: u32 = 6;
 /// Texels of the finest level along a texel of the coarsest.
 const COARSEST: u32 = 1 << (LEVELS - 1);
-/// Radius of the blur over that of the microfacets' slopes, at a distance of 1 from the mirror.
+/// Radius within which depths tell how far away is what a lobe shows, over that of the microfacets' slopes, at a distance
+/// of 1 from the mirror. The blur's own widths are in `glsl/mirror.glsl`.
 pub const SPREAD: f64 = 1.6;
 /// The same for probes, as an angle: most of what they show is faced, and a mirrored ray turns by twice a slope.
 pub const PROBE_SPREAD: f64 = 3.2;

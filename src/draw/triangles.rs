@@ -72,13 +72,12 @@ impl DrawnTriangles {
         })
     }
 
-    /// Whether a device's texel views hold the mesh, and the vertices and the self-visibility of all meshes, so that
-    /// its pixels can evaluate lights.
-    pub fn fits_views(&self, device: &Device, vertices: &Buffer, self_cells: &Buffer) -> bool {
+    /// Whether a device's texel views hold the mesh, and the vertices of all meshes, so that its pixels can evaluate
+    /// lights.
+    pub fn fits_views(&self, device: &Device, vertices: &Buffer) -> bool {
         let numbers = |buffer: &Buffer| TexelView::fits(device, vk::Format::R32_UINT, buffer.size_bytes);
         numbers(&self.indices)
             && self.paint.as_ref().is_none_or(numbers)
-            && TexelView::fits(device, vk::Format::R32G32_UINT, self_cells.size_bytes)
             && TexelView::fits(device, QUAD_FORMAT, vertices.size_bytes)
     }
 }

@@ -29,21 +29,22 @@ pub(super) struct PixelChains {
 impl PixelChains {
     /// Empty chains for the lit entities of a scene.
     pub fn new(device: &Arc<Device>, scene: &Scene, buffers: &SceneBuffers) -> Result<Self> {
+        // All pixels bind them, also those that read none.
+        let maps_fit = TexelView::fits(device, vk::Format::R32G32_UINT, buffers.self_cells.size_bytes);
         let mut clusters = 0;
         let mut receivers = Vec::with_capacity(scene.entities.len());
         for (index, entity) in scene.entities.iter().enumerate() {
             let surface = buffers.surface(index);
             let fits = match &surface.drawn {
-                // Its pixels read no maps, which are bound beside what they read.
-                DrawnMesh::Grid(..) => TexelView::fits(device, vk::Format::R32G32_UINT, buffers.self_cells.size_bytes),
-                DrawnMesh::Triangles(triangles) => triangles.fits_views(device, &buffers.vertices, &buffers.self_cells),
+                DrawnMesh::Grid(..) => true,
+                DrawnMesh::Triangles(triangles) => triangles.fits_views(device, &buffers.vertices),
             };
             let by_pixel = ByPixel {
                 cluster_first: clusters,
                 vertex_first: surface.vertices.start,
                 self_first: surface.self_first,
             };
-            let lit = entity.receives && fits && !entity.transparent;
+            let lit = entity.receives && maps_fit && fits && !entity.transparent;
             receivers.push(lit.then_some((by_pixel, surface.reach_m)));
             clusters += if lit { (surface.vertices.len() as u32).div_ceil(CLUSTER_VERTICES) } else { 0 };
         }

@@ -137,7 +137,7 @@ fn drawing() -> Vec<ShaderPermutation> {
         .chain(lit)
         .chain([Smooth::fragment()])
         .chain(
-            ["overlay.vert", "overlay.frag", "show.vert", "show.frag", "smooth.vert", "mirror_far.frag"]
+            ["overlay.vert", "overlay.frag", "show.vert", "show.frag", "sky.frag", "smooth.vert", "mirror_far.frag"]
                 .map(|file| ShaderPermutation::new(file, 4)),
         )
         .collect()

@@ -262,7 +262,23 @@ impl Environment {
         all.into_iter().filter(|disc| disc.radiance != DVec3::ZERO).map(placed).collect()
     }
 
-    fn turn(&self) -> DQuat {
+    /// Whether the radiance is the same in all directions, [`Environment::discs`] left out.
+    pub(crate) fn is_uniform(&self) -> bool {
+        let EnvironmentData { gradient, key, .. } = &self.source;
+        self.is_none() || gradient.is_none() && key.is_none() && self.dome.is_none() && self.picture.is_none()
+    }
+
+    /// The picture, where there is one.
+    pub(super) fn picture(&self) -> Option<&Equirect> {
+        self.picture.as_deref()
+    }
+
+    /// Factor on the picture's radiance.
+    pub(super) fn picture_scale(&self) -> f32 {
+        self.source.strength * self.source.image.as_ref().map_or(1.0, |image| image.scale)
+    }
+
+    pub(super) fn turn(&self) -> DQuat {
         DQuat::from_rotation_y(f64::from(self.source.turn_deg).to_radians())
     }
 

@@ -3,7 +3,7 @@
 use std::f64::consts::{PI, TAU};
 use std::io::Cursor;
 
-use glam::{DMat3, DQuat, DVec3};
+use glam::{DMat3, DQuat, DVec3, Vec3};
 use image::{ImageFormat, ImageReader, Limits};
 use rayon::prelude::*;
 
@@ -38,6 +38,8 @@ pub struct Equirect {
     /// most 8 degrees that sends at least a twentieth of all light, and up to three compact patches of up to 60 degrees
     /// that stand out.
     pub lights: Vec<Disc>,
+    /// Of these, by texel, row by row, the radiance that was theirs.
+    taken: Vec<(usize, [f32; 3])>,
     coefficients: [Vec<f64>; 3],
 }
 
@@ -85,14 +87,15 @@ impl Equirect {
             height: rgb.height() as usize,
             texels,
             lights: Vec::new(),
+            taken: Vec::new(),
             coefficients: Default::default(),
         };
-        picture.lights = picture.take_out_lights();
+        (picture.lights, picture.taken) = picture.take_out_lights();
         picture.coefficients = picture.project();
         Ok(picture)
     }
 
-    fn take_out_lights(&mut self) -> Vec<Disc> {
+    fn take_out_lights(&mut self) -> (Vec<Disc>, Vec<(usize, [f32; 3])>) {
         let width = self.width as f64;
         let height = self.height as f64;
         let direction = |x: usize, y: usize| {
@@ -101,6 +104,16 @@ impl Equirect {
             DVec3::new(level * across, up, -level * ahead)
         };
         Sky::new(&mut self.texels, [self.width, self.height], &direction).take_out_lights()
+    }
+
+    /// Width and height, texels.
+    pub fn size(&self) -> [usize; 2] {
+        [self.width, self.height]
+    }
+
+    /// Columns, rows and radiance of texels that became lights.
+    pub fn taken_out(&self) -> impl Iterator<Item = (usize, usize, Vec3)> {
+        self.taken.iter().map(|&(index, radiance)| (index % self.width, index / self.width, radiance.into()))
     }
 
     /// The texel in `direction` (unit).

@@ -9,6 +9,7 @@ use std::path::Path;
 use crate::error::{Error, Result};
 pub use crate::text::short;
 
+pub mod backdrop;
 pub mod bars;
 mod boxes;
 pub mod decode;

@@ -44,6 +44,8 @@ pub(super) struct Sky<'t> {
     solid_angles: Vec<f64>,
     /// Unit direction of the middle of a texel, by column and row.
     direction: &'t dyn Fn(usize, usize) -> DVec3,
+    /// By texel, row by row, the radiance that was taken out.
+    taken: Vec<(usize, [f32; 3])>,
 }
 
 impl<'t> Sky<'t> {
@@ -56,7 +58,8 @@ impl<'t> Sky<'t> {
             let [north, south] = [y, y + 1].map(|y| (y as f64 * PI / height as f64).cos());
             (north - south) * TAU / width as f64
         };
-        Sky { texels, width, height, solid_angles: (0..height).map(solid_angle).collect(), direction }
+        let solid_angles = (0..height).map(solid_angle).collect();
+        Sky { texels, width, height, solid_angles, direction, taken: Vec::new() }
     }
 
     fn solid_angle(&self, index: usize) -> f64 {
@@ -109,14 +112,16 @@ impl<'t> Sky<'t> {
         for &i in texels {
             let over = excess(&self.texels[i]);
             self.texels[i].iter_mut().zip(over).for_each(|(texel, over)| *texel -= over);
+            self.taken.push((i, over));
         }
         Some(Disc { name, toward, half_angle_rad, radiance: taken / solid_angle })
     }
 
-    /// Takes the sun and bright windows out.
-    pub fn take_out_lights(mut self) -> Vec<Disc> {
+    /// Takes the sun and bright windows out. Returns them, and by texel, row by row, the radiance that was theirs.
+    pub fn take_out_lights(mut self) -> (Vec<Disc>, Vec<(usize, [f32; 3])>) {
         let sun = self.take_out_sun();
-        sun.into_iter().chain(self.take_out_windows()).collect()
+        let lights = sun.into_iter().chain(self.take_out_windows()).collect();
+        (lights, self.taken)
     }
 
     fn take_out_windows(&mut self) -> Vec<Disc> {

@@ -1,7 +1,7 @@
 //! Pass "mirror": what glossy surfaces mirror.
 //!
-//! For each plane that mirrors, the scene is drawn as the eye's mirror image sees it, by the light of vertices, into a
-//! part of one picture, at half the size on software devices. A pixel of the plane finds there what it mirrors at its
+//! For each plane that mirrors, the scene is drawn as the eye's mirror image sees it, without gloss, into a part of one
+//! picture, at half the size where a software device is to be fast. A pixel of the plane finds there what it mirrors at its
 //! own place, blurred by the lobe and by how far behind the mirror that is: levels of detail of the picture are the
 //! blur. Where the picture is empty the sky is mirrored.
 //!
@@ -9,6 +9,7 @@
 //! picture. A pixel follows the mirrored ray from its own place, in steps, to where it is behind what these show. A pane
 //! counts as what it hides there, and a surface does not see itself.
 
+use crate::draw::pixel_light::LightImages;
 use crate::draw::triangles::DrawnSurface;
 use crate::draw::{Antialias, Draw, DrawnViewport, PictureLights};
 use crate::error::Result;
@@ -28,6 +29,8 @@ const COARSEST: u32 = 1 << (LEVELS - 1);
 pub const SPREAD: f64 = 1.6;
 /// The same for probes, as an angle: most of what they show is faced, and a mirrored ray turns by twice a slope.
 pub const PROBE_SPREAD: f64 = 3.2;
+/// Pixels of a picture up to which mirrors may have as many: a mirror takes 60 bytes for each.
+const MOST_FINE_PX: u32 = 1920 * 1200;
 /// Least cosine of the angle between a pixel's normal and the plane's. What this leaves of 1 is how far off the plane a
 /// pixel may lie, over its distance from the eye.
 pub const FLAT: f64 = 0.999;
@@ -71,17 +74,33 @@ pub struct Mirrors {
 }
 
 impl Mirrors {
-    /// For pictures of `size`, width and height in pixels, with at most `count` mirrors.
-    pub fn new(device: &Arc<Device>, library: &Library, size: [u32; 2], count: u32) -> Result<Self> {
+    /// For pictures of `size`, width and height in pixels, with at most `count` mirrors, `fine` ones or of half the
+    /// size; `light` is that of these pictures, where mirrors are to have such, too.
+    pub fn new(
+        device: &Arc<Device>,
+        library: &Library,
+        size: [u32; 2],
+        count: u32,
+        fine: bool,
+        light: Option<&LightImages>,
+    ) -> Result<Self> {
         // Texels of the coarsest level belong to one mirror each.
-        let texel_px = if device.info.is_software() { 2 } else { 1 };
+        let texel_px = if fine && size[0].saturating_mul(size[1]) <= MOST_FINE_PX { 1 } else { 2 };
         let most = device.most_image_px();
         let fit = |pixels: u32, most: u32| {
             pixels.div_ceil(texel_px).next_multiple_of(COARSEST).min(most / COARSEST * COARSEST)
         };
         let part = [fit(size[0], most / count), fit(size[1], most)];
-        let lights = PictureLights { pixels: None, highlights: None, mirrors: 0, mirrored: Mirrored::Nothing };
-        let draw = Draw::new(device, library, [count * part[0], part[1]], Antialias::None, lights)?;
+        let lights = PictureLights {
+            pixels: None,
+            highlights: None,
+            mirrors: 0,
+            mirrored: Mirrored::Nothing,
+            mirrored_pixels: false,
+        };
+        let all = [count * part[0], part[1]];
+        let light = light.map(|light| light.beside(all)).transpose()?;
+        let draw = Draw { light, ..Draw::new(device, library, all, Antialias::None, lights)? };
         let shape = draw.picture.shape;
         let of_far = ImageShape { format: vk::Format::R16_SFLOAT, ..shape };
         let [vertex, fragment] = ["show.vert", "mirror_far.frag"].map(|file| ShaderPermutation::new(file, 4));
@@ -124,7 +143,7 @@ impl Mirrors {
 
     pub(super) fn make(&self, surfaces: &HashSet<DrawnSurface>, grids: bool) -> Result<()> {
         let diffuse = surfaces.iter().map(|surface| DrawnSurface { detail: None, ..*surface }).collect();
-        self.draw.make(&diffuse, grids)
+        self.draw.make_shown(&diffuse, grids)
     }
 
     /// Draws what the mirrors show and makes it ready to be sampled.
@@ -139,6 +158,9 @@ impl Mirrors {
         let width = (end * self.part[0] + COARSEST).min(self.far.shape.width);
         for (image, access) in self.draw.attachments() {
             commands.image_barrier(image, None, access);
+        }
+        if let Some(light) = self.draw.pixel_light(viewports) {
+            light.record(commands, viewports)?;
         }
         self.draw.record(commands, viewports, Vec4::ZERO, MOST_RADIANCE)?;
         commands.image_barrier(&self.draw.depth, Some(Access::DepthWrite), Access::GraphicsSampled);

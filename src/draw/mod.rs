@@ -10,6 +10,7 @@ pub mod grid;
 pub mod mirror;
 pub mod pixel_light;
 pub mod show;
+pub mod sky;
 pub mod smooth;
 pub mod triangles;
 
@@ -18,6 +19,7 @@ use crate::asset::mesh::Mesh;
 use crate::draw::grid::{DrawGrid, DrawnGrid};
 use crate::draw::mirror::{Mirrored, Mirrors};
 use crate::draw::pixel_light::{ByPixel, LightImages, PixelLight, Receiver};
+use crate::draw::sky::{DrawSky, SeenSky};
 use crate::draw::smooth::Smooth;
 use crate::draw::triangles::{Detail, DrawTriangles, DrawnLayer, DrawnSurface, DrawnTriangles};
 use crate::error::Result;
@@ -213,6 +215,8 @@ pub struct DrawnViewport<'d> {
     pub gloss: Option<DrawnReflections<'d>>,
     /// Input of pixels that evaluate sharp lights; `None` where only the radiosity of vertices is shown.
     pub pixel: Option<PixelLight<'d>>,
+    /// What is seen behind everything; `None` where that has one colour.
+    pub sky: Option<SeenSky<'d>>,
     /// Which of the lines that pass "smooth" reads belong to this region.
     pub lines: Range<u32>,
 }
@@ -227,6 +231,8 @@ pub struct PictureLights {
     /// How many mirrors there may be at a time.
     pub mirrors: u32,
     pub mirrored: Mirrored,
+    /// Whether pixels evaluate lights in mirrors, too.
+    pub mirrored_pixels: bool,
 }
 
 /// What pipelines are made of that draw into the same images.
@@ -263,6 +269,7 @@ fn made_once(
 pub struct Draw {
     triangles: DrawTriangles,
     grid: DrawGrid,
+    sky: DrawSky,
     samples: Option<Image>,
     /// Reversed depth of every sample: 1 at the near plane, 0 at infinity.
     pub depth: Image,
@@ -293,10 +300,13 @@ impl Draw {
         let shape = ImageShape { format: COLOR, width, height, samples: 1 };
         let state = GraphicsState { depth: Some(DEPTH), samples, ..GraphicsState::plain(COLOR) };
         let maker = PipelineMaker { device: device.clone(), library: library.clone(), state };
-        let light = |sharp| LightImages::new(device, library, [width, height], sharp);
+        let light = lights.pixels.map(|sharp| LightImages::new(device, library, [width, height], sharp)).transpose()?;
+        let fine = antialias == Antialias::Samples || !device.info.is_software();
+        let mirrored = light.as_ref().filter(|_| lights.mirrored_pixels);
         Ok(Draw {
             triangles: DrawTriangles::new(maker.clone(), lights),
-            grid: DrawGrid::new(maker),
+            grid: DrawGrid::new(maker.clone()),
+            sky: DrawSky::new(maker),
             samples: (samples > 1)
                 .then(|| Image::new(device, "draw samples", ImageShape { samples, ..shape }))
                 .transpose()?,
@@ -304,19 +314,17 @@ impl Draw {
             picture: Image::new(device, "picture", shape)?,
             batch_triangles: if device.info.is_software() { 1 << 18 } else { u32::MAX / 3 },
             is_made: false,
-            light: lights.pixels.map(light).transpose()?,
             smooth: (antialias == Antialias::Outlines).then(|| Smooth::new(device, library, shape)).transpose()?,
             mirrors: (lights.mirrors > 0)
-                .then(|| Mirrors::new(device, library, [width, height], lights.mirrors).map(Box::new))
+                .then(|| Mirrors::new(device, library, [width, height], lights.mirrors, fine, mirrored).map(Box::new))
                 .transpose()?,
+            light,
         })
     }
 
-    /// Makes the pipelines of these surfaces, and of grids if there are `grids`, on all cores: one may take a second to
-    /// compile. Others are made where they are first drawn with.
-    pub fn make(&self, surfaces: &HashSet<DrawnSurface>, grids: bool) -> Result<()> {
-        let by_pixel = self.evaluates_pixels();
-        let grid = || if grids { self.grid.make(by_pixel) } else { Ok(()) };
+    /// Makes the pipelines of these surfaces, of grids if there are `grids`, and of the `sky` if it is drawn, on all
+    /// cores: one may take a second to compile. Others are made where they are first drawn with.
+    pub fn make(&self, surfaces: &HashSet<DrawnSurface>, grids: bool, sky: bool) -> Result<()> {
         let light = || {
             let holes = |wanted: bool| surfaces.iter().any(|surface| !surface.transparent && surface.holes == wanted);
             let triangles = [false, true].into_iter().filter(|&wanted| holes(wanted));
@@ -325,10 +333,20 @@ impl Draw {
             self.light.as_ref().map_or(Ok(()), |light| light.make(&receivers))
         };
         let mirrors = || self.mirrors.as_ref().map_or(Ok(()), |mirrors| mirrors.make(surfaces, grids));
-        let triangles = || self.triangles.make(surfaces, by_pixel);
-        let ((light, mirrors), (triangles, grid)) =
-            rayon::join(|| rayon::join(light, mirrors), || rayon::join(triangles, grid));
-        light.and(mirrors).and(triangles).and(grid)
+        let shown = || self.make_shown(surfaces, grids);
+        let (light, (mirrors, shown)) = rayon::join(light, || rayon::join(mirrors, shown));
+        if sky {
+            self.sky.make()?;
+        }
+        light.and(mirrors).and(shown)
+    }
+
+    /// Those of them that show the light.
+    fn make_shown(&self, surfaces: &HashSet<DrawnSurface>, grids: bool) -> Result<()> {
+        let by_pixel = self.evaluates_pixels();
+        let grid = || if grids { self.grid.make(by_pixel) } else { Ok(()) };
+        let (triangles, grid) = rayon::join(|| self.triangles.make(surfaces, by_pixel), grid);
+        triangles.and(grid)
     }
 
     /// Device memory of a pixel in the images of [`Draw::new`] but those of mirrors, bytes; `by_pixel` where pixels
@@ -370,7 +388,7 @@ impl Draw {
         colors.chain([(&self.depth, Access::DepthWrite)])
     }
 
-    /// Draws all viewports, one after the other, over a background of one colour and alpha. Radiance above `white` is
+    /// Draws all viewports, one after the other, over a background of one colour and alpha where they have no sky. Radiance above `white` is
     /// brought down to it, hue kept. Between the render passes of a large picture stand barriers of the pass's own.
     pub fn record<'r>(
         &'r self,
@@ -430,6 +448,12 @@ impl Draw {
                 }
                 if number + 1 < count {
                     return Ok(());
+                }
+                for viewport in viewports {
+                    if let Some(sky) = &viewport.sky {
+                        drawing.area(viewport.area);
+                        self.sky.record(drawing, sky, white)?;
+                    }
                 }
                 self.record_transparent(drawing, viewports, white)
             })?;

@@ -180,25 +180,38 @@ impl Layer {
     }
 }
 
-pub struct LightImages {
+struct LightPipelines {
     maker: PipelineMaker,
     sharp: SharpPermutation,
-    coarse: Layer,
-    fine: Layer,
     /// By receiver and way; each is made where it is first drawn with.
     made: [[OnceLock<GraphicsPipeline>; 2]; Receiver::ALL.len()],
+}
+
+pub struct LightImages {
+    pipelines: Arc<LightPipelines>,
+    coarse: Layer,
+    fine: Layer,
 }
 
 impl LightImages {
     /// For pictures of `width` x `height`.
     pub fn new(device: &Arc<Device>, library: &Library, size: [u32; 2], sharp: SharpPermutation) -> Result<Self> {
         let state = GraphicsState { depth: Some(DEPTH), ..GraphicsState::plain(LIGHT) };
+        let maker = PipelineMaker { device: device.clone(), library: library.clone(), state };
+        Self::of(Arc::new(LightPipelines { maker, sharp, made: Default::default() }), size)
+    }
+
+    /// Others for pictures of `width` x `height`, which share the pipelines.
+    pub fn beside(&self, size: [u32; 2]) -> Result<Self> {
+        Self::of(self.pipelines.clone(), size)
+    }
+
+    fn of(pipelines: Arc<LightPipelines>, size: [u32; 2]) -> Result<Self> {
+        let device = &pipelines.maker.device;
         Ok(LightImages {
-            maker: PipelineMaker { device: device.clone(), library: library.clone(), state },
-            sharp,
             coarse: Layer::new(device, "coarse light", size.map(|px| px.div_ceil(COARSE_PX)))?,
             fine: Layer::new(device, "pixel light", size)?,
-            made: Default::default(),
+            pipelines,
         })
     }
 
@@ -221,8 +234,9 @@ impl LightImages {
     }
 
     fn pipeline(&self, receiver: Receiver, way: Way) -> Result<&GraphicsPipeline> {
-        made_once(&self.made[receiver.number()][way as usize], || {
-            self.maker.make("pixel light", &Self::rows(&self.sharp, receiver, way), self.maker.state)
+        let LightPipelines { maker, sharp, made } = &*self.pipelines;
+        made_once(&made[receiver.number()][way as usize], || {
+            maker.make("pixel light", &Self::rows(sharp, receiver, way), maker.state)
         })
     }
 

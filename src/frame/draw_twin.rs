@@ -1,6 +1,7 @@
 //! The CPU twin of "draw" in f64: a picture of a frame by asking of every sample which triangle lies nearest.
 
 use super::Frame;
+use crate::asset::backdrop::Backdrop;
 use crate::draw::camera;
 use crate::draw::smooth::{self, Smooth, Texel};
 use crate::error::Result;
@@ -52,6 +53,12 @@ impl Frame {
         let triangles = self.triangles(placements)?;
         let camera = &self.scene.data.camera;
         let near_m = camera::near_m(camera);
+        let backdrop = Backdrop::new(&self.scene.environment);
+        let through = camera::through_pixels(camera, [width, height].map(f64::from));
+        let sky = |middle: DVec2| {
+            let radiance = backdrop.as_ref().map(|sky| sky.radiance(through(middle.to_array())));
+            radiance.map_or(self.sky.background.as_dvec3(), |radiance| shown(radiance, f64::from(white)))
+        };
         let shade = |pixel: u32| {
             let corner = DVec2::new(f64::from(pixel % width), f64::from(pixel / width));
             let clip =
@@ -92,7 +99,7 @@ impl Frame {
                     }
                     None => {
                         (texel.depth, texel.tag) = (0.0, 1.0);
-                        self.sky.background.as_dvec3()
+                        sky(corner + DVec2::splat(0.5))
                     }
                 };
                 texel.color += color / samples.len() as f64;

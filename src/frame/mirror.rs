@@ -6,6 +6,7 @@ use super::viewport::Viewport;
 use super::{Frame, gloss};
 use crate::asset::edges::within_picture;
 use crate::asset::mesh::Mesh;
+use crate::bounce::Bounces;
 use crate::draw::mirror::{Mirrored, PROBE_ZOOM, finest_side};
 use crate::draw::triangles::Detail;
 use crate::draw::{DrawnEntity, DrawnViewport, PictureLights};
@@ -332,7 +333,8 @@ impl Frame {
                     entities,
                     radiosity: self.radiosity.mirrored(self.options.bounces),
                     gloss: None,
-                    pixel: None,
+                    pixel: self.pixel_light(),
+                    sky: None,
                     lines: 0..0,
                 }
             };
@@ -380,15 +382,22 @@ impl Frame {
 }
 
 impl Reflectors {
-    /// How pictures evaluate lights, and what they mirror.
-    pub fn lights(&self, pixels: Option<SharpPermutation>, highlights: Option<SharpPermutation>) -> PictureLights {
+    /// How pictures evaluate lights, and what they mirror of light that bounces so often.
+    pub fn lights(
+        &self,
+        bounces: Bounces,
+        pixels: Option<SharpPermutation>,
+        highlights: Option<SharpPermutation>,
+    ) -> PictureLights {
         let count = (self.faces.len() + self.curved.len()).min(MOST) as u32;
         let mirrored = match (count, self.curved.is_empty()) {
             (0, _) => Mirrored::Nothing,
             (_, true) => Mirrored::Planes,
             (_, false) => Mirrored::PlanesAndProbes,
         };
-        PictureLights { pixels, highlights, mirrors: count, mirrored }
+        // Of fewer bounces mirrors show one less, and pixels would add it.
+        let mirrored_pixels = bounces == Bounces::All;
+        PictureLights { pixels, highlights, mirrors: count, mirrored, mirrored_pixels }
     }
 }
 

@@ -190,7 +190,7 @@ impl Frame {
             radiosity.keep_irradiances(&scene, &methods)?;
         }
         let reflectors = reflections.is_some().then(|| mirror::reflectors(&scene)).unwrap_or_default();
-        let lights = reflectors.lights(pixels, sharp);
+        let lights = reflectors.lights(options.bounces, pixels, sharp);
         if lights.mirrors > 0 && !bounces {
             radiosity.keep_dark()?;
         }

@@ -68,7 +68,7 @@ impl FramePicture {
             }
         };
         let surfaces: HashSet<DrawnSurface> = triangles.into_iter().map(surface).collect();
-        self.draw.make(&surfaces, !grids.is_empty())
+        self.draw.make(&surfaces, !grids.is_empty(), !scene.environment.is_uniform())
     }
 }
 
@@ -84,7 +84,12 @@ impl Frame {
             entities: self.drawn_in(placements, viewport),
             radiosity: self.radiosity.source(viewport.radiosity),
             gloss: self.drawn_reflections().filter(|_| viewport.shows_light()),
-            pixel: self.pixel_light(viewport),
+            pixel: self.pixel_light().filter(|_| viewport.shows_light()),
+            sky: self
+                .sky
+                .drawn()
+                .filter(|_| viewport.shows_light())
+                .map(|sky| sky.seen(&self.scene.data.camera, viewport.area)),
             lines: lines.clone(),
         };
         PictureWork {
@@ -117,7 +122,7 @@ impl Frame {
     fn draw(&self, options: &Options) -> Result<Draw> {
         let sharp = self.sharp.as_ref().map(|sharp| sharp.permutation);
         let pixels = pixel_shading(&self.device, options, &self.buffers, self.radiosity.soft(), sharp);
-        let lights = self.reflectors.lights(pixels, sharp);
+        let lights = self.reflectors.lights(options.bounces, pixels, sharp);
         Draw::new(&self.device, &self.library, options.size, options.antialias, lights)
     }
 
@@ -160,11 +165,11 @@ impl Frame {
         self.picture.draw.evaluates_pixels() || self.picture.other.as_ref().is_some_and(Draw::evaluates_pixels)
     }
 
-    /// Input of pixels that evaluate sharp lights in a viewport.
-    fn pixel_light(&self, viewport: &Viewport) -> Option<PixelLight<'_>> {
+    /// Input of pixels that evaluate sharp lights.
+    pub(super) fn pixel_light(&self) -> Option<PixelLight<'_>> {
         let chains = self.chains.as_ref().filter(|chains| chains.is_ready())?;
         let (irradiances, _) = self.radiosity.irradiances()?;
-        (self.picture.draw.evaluates_pixels() && viewport.shows_light()).then(|| PixelLight {
+        self.picture.draw.evaluates_pixels().then(|| PixelLight {
             entities: &chains.entities,
             silhouettes: [&self.buffers.silhouettes.nodes, &self.buffers.silhouettes.cells],
             entries: &chains.entries,

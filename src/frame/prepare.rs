@@ -72,6 +72,9 @@ impl Frame {
         if viewports.iter().any(Viewport::shows_light) && !std::mem::replace(&mut self.picture.draw.is_made, true) {
             self.picture.make_pipelines(&self.scene, &self.buffers, self.reflections.is_some())?;
         }
+        if viewports.iter().any(Viewport::shows_light) {
+            self.sky.prepare(&self.device, &self.scene)?;
+        }
         if !viewports.is_empty() {
             self.prepare_chains()?;
             self.prepare_gloss(placements, viewports)?;

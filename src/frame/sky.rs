@@ -1,5 +1,6 @@
 //! Distant light as a frame reads it.
 
+use crate::draw::sky::DrawnSky;
 use crate::error::Result;
 use crate::field::quantity::channel_stride;
 use crate::gpu::{Device, Upload};
@@ -17,8 +18,10 @@ pub(super) struct SkyLight {
     volume: Option<[[f32; 4]; 2]>,
     /// Its largest radiance of any colour.
     pub brightest: f64,
-    /// Its mean radiance, which pictures show behind the scene.
+    /// Its mean radiance, which pictures show behind the scene where it is the same in all directions.
     pub background: Vec3,
+    /// What pictures show instead, once one has been prepared.
+    drawn: Option<Option<DrawnSky>>,
 }
 
 impl SkyLight {
@@ -26,7 +29,7 @@ impl SkyLight {
     pub fn new(device: &Arc<Device>, bands: usize, volume: Option<[[f32; 4]; 2]>) -> Result<Self> {
         let bytes = 12 * channel_stride(bands) + volume.as_ref().map_or(0, size_of_val);
         let coefficients = Upload::new(device, "sky", bytes as u64)?;
-        Ok(SkyLight { coefficients, volume, brightest: 0.0, background: Vec3::ZERO })
+        Ok(SkyLight { coefficients, volume, brightest: 0.0, background: Vec3::ZERO, drawn: None })
     }
 
     /// Takes over a scene's environment.
@@ -39,8 +42,22 @@ impl SkyLight {
         }
         self.brightest = brightest(&channels, bands);
         self.background = Vec3::from_array(channels.map(|c| (c[0] * Y00) as f32));
+        self.drawn = None;
         floats.extend(self.volume.iter().flatten().flatten());
         self.coefficients.write(&floats)
+    }
+
+    /// Makes ready to be drawn behind a scene that has been taken over.
+    pub fn prepare(&mut self, device: &Arc<Device>, scene: &Scene) -> Result<()> {
+        if self.drawn.is_none() {
+            self.drawn = Some(DrawnSky::new(device, &scene.environment)?);
+        }
+        Ok(())
+    }
+
+    /// What pictures show behind the scene besides `background`.
+    pub fn drawn(&self) -> Option<&DrawnSky> {
+        self.drawn.as_ref()?.as_ref()
     }
 }
 

@@ -17,7 +17,6 @@ use crate::asset::environment::Environment;
 use crate::bake::links;
 use crate::bounce::LinkedLight;
 use crate::error::Result;
-use crate::gpu::texture::Level;
 use crate::gpu::{Bind, Buffer, Commands, ComputePipeline, Device, TexelView, Texture, Upload};
 use crate::layout::{CLUSTER_VERTICES, GlossEntity, NONE, QUAD_FORMAT, SHOWN_LIGHTS};
 use crate::shaders::{Library, ShaderPermutation};
@@ -28,6 +27,8 @@ use std::sync::Arc;
 
 /// Below this roughness pixels look the sky up themselves, as vertices are too far apart for what it shows.
 pub const PIXEL_ROUGHNESS: f32 = 0.4;
+/// How the pass's textures go on beyond their edges.
+const EDGE: [vk::SamplerAddressMode; 2] = [vk::SamplerAddressMode::CLAMP_TO_EDGE; 2];
 /// Least cosine by which a lobe is divided, as the transfer holds the cosine already.
 pub const LEAST_COSINE: f64 = 0.25;
 /// Least light that a share is taken of, as a share of the mean of the sky.
@@ -116,7 +117,7 @@ impl FilteredSky {
     fn new(device: &Arc<Device>, environment: &Environment) -> Result<Self> {
         let SkyMap { texels, products, scale } = SkyMap::new(environment);
         Ok(FilteredSky {
-            map: texture(device, "sky map", (sky_map::SIDE + 2) as u32, &texels)?,
+            map: Texture::of_halves(device, "sky map", (sky_map::SIDE + 2) as u32, &texels, EDGE)?,
             products: Buffer::with_data(device, "products of the sky", &products)?,
             scale,
         })
@@ -188,9 +189,9 @@ impl Reflections {
             pipeline: ComputePipeline::new(device, "gloss", &library.shader(&gloss_row(texels, links))?)?,
             texels,
             sky: FilteredSky::new(device, environment)?,
-            lobes: texture(device, "lobes", lobe::TABLE as u32, &lobe::texels())?,
-            white: texture(device, "white", 1, &[[1.0; 4]])?,
-            flat: texture(device, "flat", 1, &[[0.5, 0.5, 1.0, 1.0]])?,
+            lobes: Texture::of_halves(device, "lobes", lobe::TABLE as u32, &lobe::texels(), EDGE)?,
+            white: Texture::of_halves(device, "white", 1, &[[1.0; 4]], EDGE)?,
+            flat: Texture::of_halves(device, "flat", 1, &[[0.5, 0.5, 1.0, 1.0]], EDGE)?,
             clusters: Upload::new(device, "glossy clusters", 64)?,
             cluster_count: 0,
             entities: Upload::new(device, "glossy entities", (entity_count * size_of::<GlossEntity>()) as u64)?,
@@ -280,12 +281,4 @@ impl<'b> DrawnReflections<'b> {
             Bind::Texture(&of.lobes),
         ])
     }
-}
-
-/// A texture of halves.
-fn texture(device: &Arc<Device>, name: &str, width: u32, texels: &[[f32; 4]]) -> Result<Texture> {
-    let halves: Vec<u16> = texels.as_flattened().iter().map(|x| f16::from_f32(*x).to_bits()).collect();
-    let level = Level { width, height: texels.len() as u32 / width, bytes: bytemuck::cast_slice(&halves) };
-    let edge = [vk::SamplerAddressMode::CLAMP_TO_EDGE; 2];
-    Texture::new(device, name, vk::Format::R16G16B16A16_SFLOAT, &[level], edge)
 }

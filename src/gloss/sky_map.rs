@@ -10,11 +10,14 @@ use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 
 /// Texels along a side of a level. One more on each side continues it, for bilinear reads.
-pub const SIDE: usize = 64;
+pub const SIDE: usize = 256;
+/// Texels along a side that wide lobes need, and the first level that has such.
+const WIDE_SIDE: usize = 64;
+const FIRST_WIDE: usize = 2;
 /// Coefficients of a product's rows and columns: four bands.
 const COUNT: usize = 16;
 /// Texels along a side of the map that is filtered, and of the coarser one that wide lobes take.
-const FINE: usize = 128;
+const FINE: usize = 256;
 const COARSE: usize = 32;
 /// Least width of lobes that take the coarser map.
 const WIDE: f64 = 0.1;
@@ -64,6 +67,12 @@ fn coarser(fine: &[Cell]) -> Vec<Cell> {
     (0..COARSE * COARSE).map(cell).collect()
 }
 
+/// The radiance of the cell of [`FINE`] in a direction.
+fn radiance_at(fine: &[Cell], toward: DVec3) -> DVec3 {
+    let at = place(toward) * FINE as f64;
+    fine[(at.y as usize).min(FINE - 1) * FINE + (at.x as usize).min(FINE - 1)].radiance
+}
+
 /// What a microfacet reflection of that width sees along its axis, weighed by the cosine.
 fn filtered(axis: DVec3, alpha: f64, fine: &[Cell], coarse: &[Cell]) -> DVec3 {
     let mut light = DVec3::ZERO;
@@ -86,13 +95,27 @@ fn filtered(axis: DVec3, alpha: f64, fine: &[Cell], coarse: &[Cell]) -> DVec3 {
         let u = (i as f64 + 0.5) / SAMPLES as f64;
         let local = brdf::reflected(alpha.max(brdf::LEAST_ALPHA), DVec3::Z, u, turn);
         if local.z > 0.0 {
-            let at = place(local.x * across + local.y * along + local.z * axis) * FINE as f64;
-            let cell = (at.y as usize).min(FINE - 1) * FINE + (at.x as usize).min(FINE - 1);
-            light += local.z * fine[cell].radiance;
+            light += local.z * radiance_at(fine, local.x * across + local.y * along + local.z * axis);
             whole += local.z;
         }
     }
     light / whole
+}
+
+/// A map of `side` texels along a side, and one beyond each, from a function of the direction.
+fn level_of(side: usize, radiance: impl Fn(DVec3) -> DVec3 + Sync) -> Vec<DVec3> {
+    let wide = side + 2;
+    let at = |i: usize| DVec2::new((i % wide) as f64 - 0.5, (i / wide) as f64 - 0.5) / side as f64;
+    (0..wide * wide).into_par_iter().map(|i| radiance(direction(at(i)))).collect()
+}
+
+/// Such a map in a direction.
+fn bilinear(texels: &[DVec3], side: usize, axis: DVec3) -> DVec3 {
+    let at = place(axis) * side as f64 + 0.5;
+    let low = at.floor().min(DVec2::splat(side as f64));
+    let first = low.y as usize * (side + 2) + low.x as usize;
+    let along = |row: usize| texels[row].lerp(texels[row + 1], at.x - low.x);
+    along(first).lerp(along(first + side + 2), at.y - low.y)
 }
 
 /// Distant light as glossy surfaces read it.
@@ -108,22 +131,24 @@ pub struct SkyMap {
 impl SkyMap {
     /// Filters an environment; its discs are left out, as they are sharp lights.
     pub fn new(environment: &Environment) -> Self {
-        let wide = SIDE + 2;
         if environment.is_none() {
-            let texels = vec![[0.0; 4]; LEVELS * wide * wide];
+            let texels = vec![[0.0; 4]; LEVELS * (SIDE + 2).pow(2)];
             return SkyMap { texels, scale: 0.0, products: vec![0.0; 3 * COUNT * COUNT] };
         }
         let fine = cells(environment, FINE);
         let coarse = coarser(&fine);
-        let radiance = |i: usize| {
-            let [x, y] = [i % wide, i / wide % wide].map(|at| (at as f64 - 0.5) / SIDE as f64);
-            let axis = direction(DVec2::new(x, y));
-            match i / (wide * wide) {
-                0 => DVec3::from_array(environment.radiance(axis)),
-                level => filtered(axis, level_alpha(level as f64), &fine, &coarse),
+        let level = |level: usize| match level {
+            0 => level_of(SIDE, |axis| radiance_at(&fine, axis)),
+            _ => {
+                let lobe = |axis| filtered(axis, level_alpha(level as f64), &fine, &coarse);
+                if level < FIRST_WIDE {
+                    return level_of(SIDE, lobe);
+                }
+                let texels = level_of(WIDE_SIDE, lobe);
+                level_of(SIDE, |axis| bilinear(&texels, WIDE_SIDE, axis))
             }
         };
-        let levels: Vec<DVec3> = (0..LEVELS * wide * wide).into_par_iter().map(radiance).collect();
+        let levels: Vec<DVec3> = (0..LEVELS).flat_map(level).collect();
         let scale = levels.iter().map(|light| light.max_element()).fold(0.0, f64::max).max(f64::MIN_POSITIVE);
         SkyMap {
             texels: levels.iter().map(|light| (*light / scale).as_vec3().extend(1.0).to_array()).collect(),

@@ -9,6 +9,7 @@ use super::memory::{Buffer, BufferKind};
 use super::owned::Owned;
 use crate::error::Result;
 use ash::vk;
+use half::f16;
 use std::sync::Arc;
 
 /// Texels of one level of detail; rows from the top.
@@ -41,6 +42,19 @@ impl Texture {
         let texture = Self::empty(device, name, shape, levels.len() as u32, wrap, mipmaps)?;
         texture.fill(device, name, levels)?;
         Ok(texture)
+    }
+
+    /// A texture of one level of half floats: RGBA, rows of `width` texels.
+    pub fn of_halves(
+        device: &Arc<Device>,
+        name: &str,
+        width: u32,
+        texels: &[[f32; 4]],
+        wrap: [vk::SamplerAddressMode; 2],
+    ) -> Result<Self> {
+        let halves: Vec<u16> = texels.as_flattened().iter().map(|x| f16::from_f32(*x).to_bits()).collect();
+        let level = Level { width, height: texels.len() as u32 / width, bytes: bytemuck::cast_slice(&halves) };
+        Self::new(device, name, vk::Format::R16G16B16A16_SFLOAT, &[level], wrap)
     }
 
     /// A texture that a pass fills ([`Commands::fill_levels`]), bilinear and between two levels.

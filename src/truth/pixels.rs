@@ -4,6 +4,7 @@ use super::Vertex;
 use super::raycast::{Estimate, RayCast};
 use super::reflect::Reflection;
 use super::world::{EntityView, SurfaceHit, VertexView, World};
+use crate::asset::backdrop::Backdrop;
 use crate::draw::camera::through_pixels;
 use crate::scene::Gloss;
 use glam::DVec3;
@@ -57,11 +58,16 @@ impl<'w> Eye<'w> {
         }
     }
 
+    /// Unit direction through a place of a pixel, (0, 0) to (1, 1).
+    fn toward(&self, pixel: u32, place: [f64; 2]) -> DVec3 {
+        let [width, _] = self.size;
+        (self.direction)([f64::from(pixel % width) + place[0], f64::from(pixel / width) + place[1]])
+    }
+
     /// What a pixel, counted row by row from the top left, shows at a place within it, (0, 0) to (1, 1): from near to
     /// far, up to what lets no light through.
     pub fn seen(&self, pixel: u32, place: [f64; 2]) -> Vec<Seen> {
-        let [width, _] = self.size;
-        let direction = (self.direction)([f64::from(pixel % width) + place[0], f64::from(pixel / width) + place[1]]);
+        let direction = self.toward(pixel, place);
         let world = self.world;
         let met = self.sights.iter().filter_map(|sight| Some((sight, world.first_hit_m(sight, direction)?)));
         let mut met: Vec<(&EntityView, f64)> = met.collect();
@@ -111,7 +117,7 @@ pub struct RayPicture {
 
 /// The picture of a scene by rays through its pixels, each at four places where edges are `smoothed`, which share the
 /// rays of `cast`: emission, and light from the sky and from every light past everything, as [`RayCast`] has it. Where
-/// nothing is met it has the mean radiance of the sky. `tell` is given the rows that are done.
+/// nothing is met it has the sky as [`Backdrop`] has it. `tell` is given the rows that are done.
 pub fn picture(
     world: &World<'_>,
     [width, height]: [u32; 2],
@@ -126,7 +132,9 @@ pub fn picture(
     let runs = cast.runs.min(2);
     let cast = RayCast { rays: share.max(runs), runs, ..*cast };
     let caster = cast.caster(world);
-    let background = scene.environment.mean();
+    let backdrop = Backdrop::new(&scene.environment);
+    let mean = scene.environment.mean();
+    let background = |pixel, place| backdrop.as_ref().map_or(mean, |sky| sky.radiance(eye.toward(pixel, place)));
     let white = f64::from(scene.data.output.white());
     // The two values of a pixel, its squared radiosity and its squared standard error.
     let pixel = |pixel: u32| {
@@ -153,7 +161,7 @@ pub fn picture(
                 of_pixel[2] += radiosity * radiosity;
                 of_pixel[3] += error * error;
             }
-            radiance += free * background;
+            radiance += free * background(pixel, *place);
             // As drawing brings it down, hue kept.
             of_pixel[0] += radiance * (white / radiance.max_element().max(white));
             of_pixel[1] += radiance;

@@ -70,10 +70,16 @@ SeenLight seen_light(vec3 to, Entity shining) {
     bool rectangle = is_rectangle(light), tube = light.kind >= LIGHT_TUBE;
     vec2 radii = (rectangle ? shining.light_size * vec2(1.0, light.ratio) : vec2(sqrt(shining.light_size))) / shining.centre.w;
     mat3 axes = mat3(light.toward, light.across, light.down);
-    vec3 along = vec3(equal(uvec3(tube ? light.kind : LIGHT_TUBE), LIGHT_TUBE + uvec3(0, 1, 2)));
-    along = to_world(shining, along) * axes;
+    vec3 axis = vec3(equal(uvec3(tube ? light.kind : LIGHT_TUBE), LIGHT_TUBE + uvec3(0, 1, 2)));
+    vec3 along = to_world(shining, axis) * axes;
     vec3 beside = cross(along, vec3(1.0, 0.0, 0.0));
     beside = tube ? beside / max(length(beside), 1e-6) : to_world(shining, vec3(0.0, 0.0, 1.0)) * axes;
+    // A slat is as wide as it is seen to be.
+    float thin = abs(shining.light_thin);
+    float cosine = dot(to_world(shining, shining.light_thin < 0.0 ? axis.yzx : axis.zxy) * axes, beside);
+    float seen = tube && thin < 1.0 ? abs(cosine) + thin * sqrt(max(1.0 - cosine * cosine, 0.0)) : 1.0;
+    radii.y *= seen;
+    light.ratio *= seen;
     light.facing = tube ? cross(along, beside) : to_world(shining, vec3(0.0, 1.0, 0.0)) * axes;
     // Of two sides that shine, the one that is seen.
     light.facing *= light.kind == LIGHT_SHEET && light.facing.x > 0.0 ? -1.0 : 1.0;

@@ -109,8 +109,9 @@ shared_struct! {
         half_sides: [f32; 2],
         /// Of a sharp light: the first of its irradiances on all vertices, or [`NONE`] where they are not kept.
         irradiance_first: u32,
+        /// Of a tube: its thickness over its width, 1 of a round one; see [`crate::field::sub_light::LampFace::Tube`].
+        light_thin: f32,
         /// Texels hold a multiple of four words.
-        unused: u32,
         unused_pair: [f32; 2],
     }
 }

@@ -256,20 +256,28 @@ impl Mesh {
         [places().fold(Vec3::MAX, Vec3::min), places().fold(Vec3::MIN, Vec3::max)]
     }
 
-    /// The tube that the mesh is, if it is convex, long along one of its axes, and at most twice as wide as thick. A body
-    /// that is not round counts as the cylinder of its length and area.
+    /// The tube that the mesh is, if it is convex and long along one of its axes. One at most twice as wide as thick counts as
+    /// the cylinder of its length and area, and a wider one as a slat that fills the box around it to that area.
     fn tube(&self) -> Option<LampFace> {
         let [low, high] = self.extent();
         let size = high - low;
         let axis = size.max_position();
         let [a, b] = [size[(axis + 1) % 3], size[(axis + 2) % 3]];
-        if a.max(b) > 2.0 * a.min(b) || !self.is_convex() {
+        let [wide, thick] = [a.max(b), a.min(b)].map(f64::from);
+        if !self.is_convex() || self.is_flat() {
             return None;
         }
-        // 2 pi l^2 (radius + radius^2) is the area of a cylinder of length l.
-        let share = self.area_m2() / (std::f64::consts::TAU * f64::from(size[axis]).powi(2));
-        let radius = ((1.0 + 4.0 * share).sqrt() - 1.0) / 2.0;
-        (0.0 < radius && radius <= TUBE).then_some(LampFace::Tube { axis, radius })
+        let length = f64::from(size[axis]);
+        let (radius, thin) = if wide <= 2.0 * thick {
+            // 2 pi l^2 (radius + radius^2) is the area of a cylinder of length l.
+            let share = self.area_m2() / (std::f64::consts::TAU * length * length);
+            (((1.0 + 4.0 * share).sqrt() - 1.0) / 2.0, 1.0)
+        } else {
+            let whole = 2.0 * (length * (wide + thick) + wide * thick);
+            let thin = thick / wide;
+            (self.area_m2() / whole * wide / (2.0 * length), if a >= b { thin } else { -thin })
+        };
+        (0.0 < radius && radius <= TUBE).then_some(LampFace::Tube { axis, radius, thin })
     }
 
     /// The face that shines: of a body that shines from one side, of a rectangle in one colour at right angles to +y

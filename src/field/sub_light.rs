@@ -42,12 +42,15 @@ pub enum LampFace {
     Rectangle(f64),
     /// A rectangle that shines from both sides.
     Sheet(f64),
-    /// A body that is long and about as wide as thick: the rectangle about its axis that faces whoever sees it.
+    /// A body that is long: the rectangle about its axis that faces whoever sees it.
     Tube {
         /// Which of the mesh's axes it lies along, 0 to 2.
         axis: usize,
-        /// Its radius over its length, at most [`TUBE`].
+        /// Half its width over its length, at most [`TUBE`].
         radius: f64,
+        /// 1 for a round one. Of a slat its thickness over its width, negative where it is wide along the second axis after
+        /// its own and not along the next.
+        thin: f64,
     },
 }
 
@@ -61,8 +64,14 @@ impl LampFace {
         match self {
             LampFace::Disc(share) => DVec2::splat(share.sqrt()),
             LampFace::Rectangle(ratio) | LampFace::Sheet(ratio) => DVec2::new(1.0, ratio) / ratio.hypot(1.0),
-            // Longer by a radius, it covers as much as the tube and its ends do on average over all directions.
-            LampFace::Tube { radius, .. } => DVec2::new(1.0 + radius, 2.0 * radius) / (2.0 * radius).hypot(1.0),
+            LampFace::Tube { radius, thin, .. } => {
+                // So much longer, of a round one by its radius, it covers as much as the tube and its ends do on average
+                // over all directions.
+                let width = 2.0 * radius;
+                let ends = width * thin.abs() / (1.0 + thin.abs());
+                let thickness = if thin == 1.0 { 0.0 } else { width * thin };
+                DVec2::new(1.0 + ends, width) / (1.0 + width * width + thickness * thickness).sqrt()
+            }
         }
     }
 }
@@ -207,20 +216,22 @@ impl SeenLight {
 
     /// The face of a panel with that bounding sphere, turned by `rotation`.
     pub fn panel(to: DVec3, radius: f64, panel: LampFace, rotation: DQuat) -> Self {
-        let half = radius * panel.half();
+        let mut half = radius * panel.half();
         let is_rectangle = !matches!(panel, LampFace::Disc(_));
-        let (area, pattern) = match is_rectangle {
-            true => (4.0 * half.x * half.y, Pattern::rectangle(half)),
-            false => (PI * half.x * half.y, Pattern::DISC),
-        };
         // Along both edges, and off the side that shines.
         let axes = match panel {
-            LampFace::Tube { axis, .. } => {
+            LampFace::Tube { axis, thin, .. } => {
                 let along = rotation * DVec3::AXES[axis];
                 let beside = along.cross(to).normalize_or(along.any_orthonormal_vector());
+                let wide = rotation * DVec3::AXES[(axis + if thin < 0.0 { 2 } else { 1 }) % 3];
+                half.y *= slat_share(thin.abs(), beside.dot(wide));
                 [along, beside, along.cross(beside)]
             }
             _ => [DVec3::X, DVec3::Z, DVec3::Y].map(|axis| rotation * axis),
+        };
+        let (area, pattern) = match is_rectangle {
+            true => (4.0 * half.x * half.y, Pattern::rectangle(half)),
+            false => (PI * half.x * half.y, Pattern::DISC),
         };
         let half = [half.x * axes[0], half.y * axes[1]];
         let front = axes[2];
@@ -320,6 +331,12 @@ impl SeenLight {
     }
 }
 
+/// How wide a tube is of so much thickness over width, over that width, along a direction at right angles to its axis
+/// with that cosine to its width.
+fn slat_share(thin: f64, cosine: f64) -> f64 {
+    if thin == 1.0 { 1.0 } else { cosine.abs() + thin * (1.0 - cosine * cosine).max(0.0).sqrt() }
+}
+
 /// Irradiance of a surface at the origin by a convex polygon of radiance 1, of which it sees what is above its horizon:
 /// the sum over the edges of half of the angle each fills, times the cosine of its plane's normal to the surface's
 /// (Lambert, *Photometria*, 1760).
@@ -417,11 +434,42 @@ mod tests {
         }
     }
 
+    /// Against the sum over the patches of a box ten times as long as wide and five times as wide as thick.
+    #[test]
+    fn a_slat_sends_what_its_surface_sends() {
+        let size = DVec3::new(0.1, 0.02, 1.0);
+        let slat = LampFace::Tube { axis: 2, radius: 0.05, thin: 0.2 };
+        for (to, normal) in [
+            (DVec3::new(0.1, 1.0, 0.1), DVec3::Y),
+            (DVec3::new(1.0, 0.1, 0.3), DVec3::X),
+            (DVec3::new(0.8, 0.8, 1.5), DVec3::new(0.6, 0.8, 0.0)),
+            (DVec3::new(0.0, 0.5, 0.4), DVec3::Y),
+        ] {
+            let light = SeenLight::panel(to, 0.5 * size.length(), slat, DQuat::IDENTITY);
+            let mut sum = 0.0;
+            const STEPS: u32 = 100;
+            for (axis, side) in (0..3).flat_map(|axis| [(axis, 0.5), (axis, -0.5)]) {
+                let [u, v] = [1, 2].map(|step| (axis + step) % 3);
+                for (i, j) in (0..STEPS).flat_map(|i| (0..STEPS).map(move |j| (i, j))) {
+                    let share = |k: u32| (f64::from(k) + 0.5) / f64::from(STEPS) - 0.5;
+                    let place = side * size * DVec3::AXES[axis]
+                        + size * (share(i) * DVec3::AXES[u] + share(j) * DVec3::AXES[v]);
+                    let to = to + place;
+                    let outward = 2.0 * side * DVec3::AXES[axis];
+                    let facing = (-outward.dot(to)).max(0.0) * normal.dot(to).max(0.0);
+                    sum += facing * size[u] * size[v] / f64::from(STEPS * STEPS) / to.length_squared().powi(2);
+                }
+            }
+            let found = light.irradiance(normal);
+            assert!((found / sum - 1.0).abs() < 0.06, "{to}: {found} of {sum}");
+        }
+    }
+
     /// Against the sum over the patches of a cylinder and its two ends.
     #[test]
     fn a_tube_sends_what_its_surface_sends() {
         for (radius, limit) in [(0.125, 0.06), (0.02, 0.02)] {
-            let tube = LampFace::Tube { axis: 2, radius };
+            let tube = LampFace::Tube { axis: 2, radius, thin: 1.0 };
             for (to, normal) in [
                 (DVec3::new(0.3, 1.0, 0.1), DVec3::Y),
                 (DVec3::new(0.3, 3.0, 1.5), DVec3::Y),

@@ -175,6 +175,7 @@ impl Frame {
             light_kind: method.kind() as u32,
             light_size: light_size as f32,
             light_ratio: light_ratio as f32,
+            light_thin: if let LightMethod::LampFace(LampFace::Tube { thin, .. }) = method { thin as f32 } else { 0.0 },
             light_ramp: entity.spot.map_or([0.0, 1.0], |spot| spot.ramp().map(|x| x as f32)),
             half_sides: sheet.map_or([0.0; 2], |rectangle| rectangle.half_m.map(|half| half as f32)),
             blocked_base: device_mesh.blocked.as_ref().map_or(0, FieldSlot::quad),

@@ -9,7 +9,7 @@ use super::own_visibility::{Rays, Seen};
 use super::surfaces::GroupSpace;
 use crate::asset::Mesh;
 use crate::asset::mesh::Attributes;
-use glam::Vec3;
+use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 use std::collections::{HashMap, HashSet};
 
@@ -21,10 +21,25 @@ const COSINE_LENGTH: f32 = 1.445;
 /// to its two sides has nothing to do with each other, though both may see the same of the sky, or none.
 const CROSSED: f32 = 0.1;
 /// Cosine between the normals of an edge's ends above which a line from one to the other lies along the surface.
-const FLAT: f32 = 0.9999;
+pub(super) const FLAT: f32 = 0.9999;
 /// Once all differences, each times its edge's squared length, are less than this share of the surfaces' area, only large
 /// ones and edges that pass through something are split. A room with its lamp has 18 300 vertices for 21 800.
 const MOST_LEFT: f32 = 0.0025;
+/// Of the vertices that may be added one in so many follows the shadows of suns.
+const SUNS_SHARE: usize = 4;
+/// Weights of a triangle's corners at the places where a sun is looked for.
+const WITHIN: [[f32; 3]; 10] = [
+    [0.96, 0.02, 0.02],
+    [0.02, 0.96, 0.02],
+    [0.02, 0.02, 0.96],
+    [0.65, 0.33, 0.02],
+    [0.33, 0.02, 0.65],
+    [0.02, 0.65, 0.33],
+    [0.33, 0.65, 0.02],
+    [0.65, 0.02, 0.33],
+    [0.02, 0.33, 0.65],
+    [0.34, 0.33, 0.33],
+];
 /// Share of the vertices by which a round may grow a group, so that the worst edges are split first.
 const GROWTH: f64 = 0.35;
 
@@ -144,6 +159,36 @@ impl Refined {
         worst.into_iter().map(|(edge, (difference, length))| (difference, length, edge)).collect()
     }
 
+    /// The longest edges of triangles on which one of the suns shines in parts, where they are longer than `least_m`, by
+    /// their places. `even` keeps triangles that were found not to be.
+    fn half_lit(
+        &self,
+        space: &GroupSpace<'_>,
+        suns: &[DVec3],
+        least_m: f32,
+        even: &mut HashSet<[u32; 3]>,
+    ) -> HashSet<Edge> {
+        let nudges = space.nudges(&self.positions, &self.normals, &self.triangles);
+        let suns: Vec<(DVec3, Vec3)> = suns.iter().map(|sun| (*sun, space.local(*sun))).collect();
+        let is_half_lit = |triangle: &[u32; 3]| {
+            let corners = triangle.map(|v| self.positions[v as usize]);
+            let nudges = triangle.map(|v| nudges[v as usize]);
+            let across = (corners[1] - corners[0]).cross(corners[2] - corners[0]);
+            let mix = |of: [Vec3; 3], [a, b, c]: [f32; 3]| a * of[0] + b * of[1] + c * of[2];
+            suns.iter().filter(|(_, local)| across.dot(*local) > 0.0).any(|(sun, _)| {
+                let mut lit = WITHIN.iter().map(|at| space.sees(mix(corners, *at) + mix(nudges, *at), *sun));
+                let first = lit.next();
+                lit.any(|lit| Some(lit) != first)
+            })
+        };
+        let longest = |[a, b, c]: &[u32; 3]| self.longest(&[edge(*a, *b), edge(*b, *c), edge(*c, *a)]);
+        let is_open = |triangle: &&[u32; 3]| self.length(longest(triangle)) > least_m && !even.contains(*triangle);
+        let open: Vec<[u32; 3]> = self.triangles.iter().filter(is_open).copied().collect();
+        let (half_lit, others): (Vec<_>, Vec<_>) = open.into_par_iter().partition(is_half_lit);
+        even.extend(others);
+        half_lit.iter().map(|triangle| self.shared(longest(triangle))).collect()
+    }
+
     /// Splits edges, given by their places, and those longest edges of triangles that have to be split before them.
     fn split(&mut self, mut marked: HashSet<Edge>) {
         loop {
@@ -223,11 +268,38 @@ pub(super) struct Limits {
     pub edge: f32,
     /// Edges up to this length are never split.
     pub least_edge: f32,
+    /// Longest edge of a triangle that the edge of a sun's shadow crosses.
+    pub sun_edge: f32,
+}
+
+/// Splits triangles on which a sun shines in parts. The light that bounces off a surface is that of its vertices: through
+/// a window between two of them no sun would come in, and through one with a vertex it would shine on all that is nearest
+/// to that.
+fn follow_suns(surfaces: &mut [(Refined, GroupSpace<'_>, bool)], suns: &[DVec3], limits: &Limits, budget: usize) {
+    let count =
+        |surfaces: &[(Refined, GroupSpace<'_>, bool)]| surfaces.iter().map(|s| s.0.positions.len()).sum::<usize>();
+    let mut even = vec![HashSet::new(); surfaces.len()];
+    loop {
+        let mut all_even = true;
+        for ((refined, space, _), even) in surfaces.iter_mut().zip(&mut even) {
+            let marked = refined.half_lit(space, suns, limits.sun_edge / space.scale(), even);
+            all_even &= marked.is_empty();
+            refined.split(marked);
+        }
+        if all_even || count(surfaces) >= budget {
+            break;
+        }
+    }
 }
 
 /// Refines the surfaces of a group together; each comes with the space that its points are seen in. `told` hears how
 /// many vertices there are.
-pub(super) fn refine(surfaces: &mut [(Refined, GroupSpace<'_>, bool)], limits: &Limits, told: &dyn Fn(usize)) {
+pub(super) fn refine(
+    surfaces: &mut [(Refined, GroupSpace<'_>, bool)],
+    suns: &[DVec3],
+    limits: &Limits,
+    told: &dyn Fn(usize),
+) {
     let count =
         |surfaces: &[(Refined, GroupSpace<'_>, bool)]| surfaces.iter().map(|s| s.0.positions.len()).sum::<usize>();
     let start = count(surfaces);
@@ -239,6 +311,10 @@ pub(super) fn refine(surfaces: &mut [(Refined, GroupSpace<'_>, bool)], limits: &
         let most = if *flat { limits.flat_edge } else { limits.edge };
         let budget = refined.positions.len() + share;
         refined.cut_longest(most / space.scale(), budget);
+    }
+    if !suns.is_empty() {
+        let budget = count(surfaces) + (limits.vertices - start) / SUNS_SHARE;
+        follow_suns(surfaces, suns, limits, budget);
     }
     let area: f32 = surfaces.iter().map(|(refined, space, _)| refined.area() * space.scale().powi(2)).sum();
     loop {

@@ -3,13 +3,14 @@
 
 use super::cluster_order::cluster_order;
 use super::links::{Link, Met, RUNS, Runs, links};
-use super::own_visibility::{Counts, Eye, Front, PATTERN, Rays, Seen, Standing, Target, see};
+use super::own_visibility::{Counts, Eye, Front, PATTERN, Rays, Seen, Standing, Target, see, sphere};
 use super::packet::{BlockerHit, BlockerTriangle, Blockers, Mask};
-use super::refine::{Limits, Refined, refine};
+use super::refine::{FLAT, Limits, Refined, refine};
 use super::triangles::{distinct, weights};
 use super::visibility_volume::VolumePlan;
 use super::{BakeReport, Options, Progress, TRANSFER_OFFSET, Wanted, bakes_transfer};
 use crate::asset::Mesh;
+use crate::asset::disc::Disc;
 use crate::asset::enclose::{around_boxes, around_spheres};
 use crate::asset::generate::Generator;
 use crate::asset::grid::Grid;
@@ -29,7 +30,7 @@ use std::sync::{Arc, OnceLock};
 use std::time::Instant;
 
 /// Counts in every name of the cache: another number where a bake of surfaces computes something else.
-const VERSION: u32 = 35;
+const VERSION: u32 = 36;
 /// How far towards the middle of its triangles a vertex is seen from, as a share of the way: the light of a crease is
 /// that just inside each face. Where meshes are left as they are, so are the places from which they are seen.
 const NUDGE: f32 = 0.02;
@@ -43,6 +44,12 @@ const FAR: f64 = 0.65;
 /// or long member reaches far beyond the box, and a floor on which it stands touches that: sun patches on the floor
 /// of a house with windows err 0.187 by maps and 0.025 by outlines, the shadow of a bowl on a table 0.062 and 0.024.
 const WITHIN: f64 = 0.02;
+/// What blocks more than this share of all directions from a member, as a cave does, is part of all of its maps: that is
+/// around it, wherever its middle is. So many vertices look, each in so many directions.
+const AROUND: f64 = 0.6;
+const LOOKS: [usize; 2] = [16, 64];
+/// Angular radius below which the shadows of a sun have edges that surfaces follow: 3 degrees.
+const CRISP_RAD: f64 = 0.05;
 /// Of the vertices to which surfaces may grow one in so many is added at least, however many there were: a floor below a
 /// fine statue is lit at four of its own.
 const LEAST_ADDED: usize = 4;
@@ -94,8 +101,13 @@ pub struct GroupPlan {
     bands: usize,
     /// Vertices to which all surfaces of the scene may grow, and whether anything moves in it.
     refinement: Option<(u32, bool)>,
+    /// Unit directions of suns whose shadows have edges, world. Surfaces are finer there, for what light bounces off them,
+    /// but serve other suns as well.
+    suns: Vec<DVec3>,
     /// Name in the cache; `None` where nothing has to be baked.
     pub key: Option<String>,
+    /// The same for all suns.
+    name: String,
     /// Where boxes move among the members, world, metres: least and largest corners; `None` for anywhere.
     screens: Vec<Option<[DVec3; 2]>>,
     /// What it blocks where other things move.
@@ -164,6 +176,8 @@ impl SurfacePlan {
             }
         };
         let screens: Vec<_> = scene.screens().into_iter().map(|entity| scene.reach(entity)).collect();
+        let is_crisp = |sun: &Disc| sun.half_angle_rad < CRISP_RAD;
+        let suns: Vec<DVec3> = scene.environment.discs().into_iter().filter(is_crisp).map(|sun| sun.toward).collect();
         let mut plans: Vec<GroupPlan> = Vec::new();
         // The plans of entities alone: those with equal meshes share what is baked.
         let mut alone: HashMap<([u8; 32], [bool; 4], Option<*const Texture>), usize> = HashMap::new();
@@ -186,25 +200,35 @@ impl SurfacePlan {
             let bands = options.bands;
             let among_screens = members.len() > 1 && scene.is_at_rest(entities[0]);
             let screens = if among_screens { screens.clone() } else { Vec::new() };
-            let plan =
-                GroupPlan { entities, members, wanted, bands, refinement, screens, key: None, volume: None }.named();
+            let suns = if members.len() > 1 { suns.clone() } else { Vec::new() };
+            let plan = GroupPlan {
+                entities,
+                members,
+                wanted,
+                bands,
+                refinement,
+                suns,
+                screens,
+                key: None,
+                name: String::new(),
+                volume: None,
+            };
+            let plan = plan.named();
             // Of the sky, and of surfaces that light bounces from.
             let has_use = wanted.transfer || options.groups;
             let moved = has_use.then(|| plan.moved_among(scene)).flatten();
-            let volume = moved.and_then(|(wanted, radius_m)| {
-                let name = plan.key.clone().unwrap_or_else(|| plan.name());
-                VolumePlan::new(&name, wanted, radius_m, options.bands)
-            });
+            let volume =
+                moved.and_then(|(wanted, radius_m)| VolumePlan::new(&plan.name, wanted, radius_m, options.bands));
             plans.push(GroupPlan { volume, ..plan });
         }
         SurfacePlan { groups: plans }
     }
 
-    /// Names of all that is baked: another scene with these names needs the same surfaces.
+    /// Names of all that is baked, whatever the suns: another scene with these names can do with the same surfaces.
     pub fn keys(&self) -> Vec<(&[usize], [Option<&str>; 2])> {
         let with_keys = self.groups.iter().map(|group| {
             let volume = group.volume.as_ref().map(|volume| &volume.key[..]);
-            (&group.entities[..], [group.key.as_deref(), volume])
+            (&group.entities[..], [group.key.as_ref().map(|_| &group.name[..]), volume])
         });
         with_keys.collect()
     }
@@ -233,15 +257,22 @@ impl GroupPlan {
             wanted,
             bands,
             refinement: None,
+            suns: Vec::new(),
             screens: Vec::new(),
             key: None,
+            name: String::new(),
             volume: None,
         };
         plan.named()
     }
 
     fn named(mut self) -> Self {
-        self.key = self.needs_bake().then(|| self.name());
+        let name = self.name();
+        self.key = self.needs_bake().then(|| match self.suns.is_empty() {
+            true => name.clone(),
+            false => blake3::hash(format!("{name} {:?}", self.suns).as_bytes()).to_hex()[..32].to_owned(),
+        });
+        self.name = name;
         self
     }
 
@@ -253,7 +284,7 @@ impl GroupPlan {
         }
     }
 
-    /// A hash of everything that decides the surfaces.
+    /// A hash of everything that decides the surfaces but suns.
     fn name(&self) -> String {
         let mut hasher = blake3::Hasher::new();
         let numbers = format!(
@@ -344,7 +375,7 @@ impl GroupPlan {
         let start = refined.iter().map(|(refined, ..)| refined.positions.len()).sum();
         if let Some(limits) = self.limits(&group, start).filter(|_| !refined.is_empty()) {
             let most = limits.vertices.max(1) as u32;
-            refine(&mut refined, &limits, &|count| progress((count as u32).min(most) / 2, most));
+            refine(&mut refined, &self.suns, &limits, &|count| progress((count as u32).min(most) / 2, most));
         }
         let mut surfaces = self.plain();
         let mut parents: Vec<Option<Vec<u32>>> = vec![None; surfaces.len()];
@@ -355,15 +386,32 @@ impl GroupPlan {
                 surfaces[member].mesh = Arc::new(refined.into_mesh(own));
             }
         }
-        let lit: Vec<Lit> = (&surfaces, &self.members, &parents)
+        let spaces: Vec<GroupSpace<'_>> = (0..self.members.len()).map(|member| group.space(member)).collect();
+        let nudges: Vec<Vec<Vec3>> = spaces
+            .par_iter()
+            .zip(&surfaces)
+            .map(|(space, surface)| {
+                space.nudges(&surface.mesh.positions, &surface.mesh.normals, &surface.mesh.triangles)
+            })
+            .collect();
+        let is_mixed_run = |member: usize, vertices: &[u32]| {
+            let mesh = &surfaces[member].mesh;
+            is_mixed(mesh, vertices) || spaces[member].divides(mesh, &nudges[member], vertices)
+        };
+        let lit: Vec<Lit> = (0..self.members.len())
             .into_par_iter()
-            .map(|(surface, member, parents)| Lit::new(&member.mesh, &surface.mesh, parents.as_deref()))
+            .map(|member| {
+                let surface = &surfaces[member].mesh;
+                let is_mixed = |run: &[u32]| is_mixed_run(member, run);
+                Lit::new(&self.members[member].mesh, surface, parents[member].as_deref(), &is_mixed)
+            })
             .collect();
         let mut runs = Runs::new(lit.iter().map(|lit| lit.order.len()));
         let is_mixed = |(member, first, count): (usize, usize, usize)| {
-            is_mixed(&surfaces[member].mesh, &lit[member].order[first..first + count])
+            is_mixed_run(member, &lit[member].order[first..first + count])
         };
-        runs.mixed = runs.all().map(is_mixed).collect();
+        let all: Vec<(usize, usize, usize)> = runs.all().collect();
+        runs.mixed = all.into_par_iter().map(is_mixed).collect();
         let total: usize = receivers.iter().map(|&member| surfaces[member].mesh.positions.len()).sum();
         let mut done = 0;
         for &member in &receivers {
@@ -398,6 +446,7 @@ impl GroupPlan {
             flat_edge: if moves { flat_edge } else { 0.1 * extent.max(1.0) },
             edge: 0.1 * extent,
             least_edge: 0.004 * extent,
+            sun_edge: 0.01 * extent,
         })
     }
 }
@@ -569,6 +618,30 @@ impl GroupSpace<'_> {
         self.first_between(&self.blocks, from, to).is_some()
     }
 
+    /// Whether anything stands between vertices of the mesh, as a floor below the wall of two rooms, or a slab on its
+    /// outside: what lights some of them does not light the others. The mesh itself counts where they lie in one plane.
+    fn divides(&self, mesh: &Mesh, nudges: &[Vec3], vertices: &[u32]) -> bool {
+        let place = |v: &u32| mesh.positions[*v as usize] + nudges[*v as usize];
+        let Some((first, others)) = vertices.split_first() else { return false };
+        let normal = |v: &u32| mesh.normals[*v as usize];
+        let is_plane = others.iter().all(|v| normal(v).dot(normal(first)) > FLAT);
+        let counts = if is_plane { &self.blocks } else { &self.others };
+        others.iter().any(|v| self.first_between(counts, place(first), place(v)).is_some())
+    }
+
+    /// Whether the way from a point of the member's frame towards a sun is free.
+    pub fn sees(&self, point: Vec3, sun: DVec3) -> bool {
+        let from = self.group.place(self.own().placement.point(point.as_dvec3()));
+        let mut hits = Vec::with_capacity(1);
+        self.group.blockers.first(from, &Mat3A::IDENTITY, &[sun.as_vec3a()], &self.blocks, &mut hits);
+        hits[0].is_none()
+    }
+
+    /// A direction of the world in the member's frame.
+    pub fn local(&self, toward: DVec3) -> Vec3 {
+        (self.own().placement.turn().inverse() * toward).as_vec3()
+    }
+
     /// The first of those members that count.
     fn first_between(&self, counts: &[bool], from: Vec3, to: Vec3) -> Option<BlockerHit> {
         let [from, to] = [from, to].map(|place| self.group.place(self.own().placement.point(place.as_dvec3())));
@@ -586,17 +659,50 @@ impl GroupSpace<'_> {
         self.group.plan.members.len() > 1 && cover().is_some_and(|hit| !hit.is_behind())
     }
 
-    /// The members that are so near a cluster, given by its vertices, that its maps have their shadows.
-    fn near(&self, positions: impl Iterator<Item = Vec3>) -> Vec<u32> {
+    /// Whether a member casts its shadows by an outline, or in closed form, at every distance.
+    fn keeps_outline(&self, member: usize) -> bool {
+        let of = &self.group.plan.members[member];
+        let has_closed_form = of.boxed || of.mesh.rectangle().is_some() || of.mesh.is_convex();
+        !of.occludes || of.emits || (of.mask.is_none() && has_closed_form)
+    }
+
+    /// Other members that are around this one, of those that keep no outline.
+    fn around(&self, mesh: &Mesh, nudges: &[Vec3]) -> Vec<bool> {
+        let group = self.group;
+        let rays = sphere();
+        let toward: Vec<Vec3A> = rays.iter().step_by(rays.len() / LOOKS[1]).map(|ray| ray.local).collect();
+        let step = mesh.positions.len().div_ceil(LOOKS[0]);
+        let origins: Vec<Vec3A> = mesh
+            .positions
+            .iter()
+            .zip(nudges)
+            .step_by(step)
+            .map(|(p, nudge)| group.place(self.own().placement.point((*p + *nudge).as_dvec3())))
+            .collect();
+        let is_around = |member: usize| {
+            let (middle, reach) = group.spheres[member];
+            let mut counts = vec![false; self.blocks.len()];
+            counts[member] = self.others[member];
+            let is_beside = |origin: &Vec3A| origin.as_dvec3().distance(middle) > reach;
+            if !counts[member] || self.keeps_outline(member) || origins.iter().any(is_beside) {
+                return false;
+            }
+            let mut hits = Vec::with_capacity(origins.len() * toward.len());
+            origins.iter().for_each(|o| group.blockers.first(*o, &Mat3A::IDENTITY, &toward, &counts, &mut hits));
+            hits.iter().flatten().count() as f64 > AROUND * hits.len() as f64
+        };
+        (0..self.blocks.len()).into_par_iter().map(is_around).collect()
+    }
+
+    /// The members that are so near a cluster, given by its vertices, that its maps have their shadows; `around` are
+    /// near all.
+    fn near(&self, positions: impl Iterator<Item = Vec3>, around: &[bool]) -> Vec<u32> {
         let group = self.group;
         let place = |p: Vec3| (self.own().placement.point(p.as_dvec3()) - group.centre) / group.radius_m;
         let places: Vec<DVec3> = positions.map(place).collect();
         let is_near = |member: &usize| {
             let (middle, reach) = group.spheres[*member];
             let of = &group.plan.members[*member];
-            // Outlines of these hold at every distance.
-            let has_closed_form = of.boxed || of.mesh.rectangle().is_some() || of.mesh.is_convex();
-            let keeps_outline = of.emits || (of.mask.is_none() && has_closed_form);
             let [low, high] = group.boxes[*member];
             let is_within = |place: &DVec3| {
                 let local = of.placement.local(group.centre + group.radius_m * *place);
@@ -607,7 +713,7 @@ impl GroupSpace<'_> {
             let is_close =
                 |place: &DVec3| place.distance(middle) < FAR * reach && (of.mask.is_some() || is_within(place));
             let comes_near = || places.iter().any(is_close);
-            (*member == self.member && !of.boxed) || (of.occludes && !keeps_outline && comes_near())
+            (*member == self.member && !of.boxed) || around[*member] || (!self.keeps_outline(*member) && comes_near())
         };
         (0..group.spheres.len()).filter(is_near).map(|member| member as u32).collect()
     }
@@ -628,8 +734,11 @@ impl GroupSpace<'_> {
         let around = OnceLock::new();
         let stride = channel_stride(plan.bands);
         let mut transfer = vec![0.0; mesh.positions.len() * stride];
-        // Pixels of a grid read no maps: all members cast their own shadows there, whose edges are crisp.
-        let has_maps = wanted.self_visibility && Grid::find(&mesh).is_none();
+        // Pixels of a grid read no maps: all members cast their own shadows there, whose edges are crisp. One with maps is
+        // drawn by its triangles.
+        let members_around = self.around(&mesh, &nudges);
+        let is_grid = || Grid::find(&mesh).is_some();
+        let has_maps = wanted.self_visibility && (members_around.contains(&true) || !is_grid());
         let mut maps = vec![0; if has_maps { mesh.positions.len() * BYTES } else { 0 }];
         let mut near = Vec::with_capacity(order.len().div_ceil(CLUSTER_VERTICES as usize));
         let mut any_blocked = false;
@@ -640,7 +749,7 @@ impl GroupSpace<'_> {
         for batch in clusters.chunks(16) {
             let look = |cluster: &&[u32]| {
                 let places = cluster.iter().map(|&v| mesh.positions[v as usize]);
-                let near = if has_maps { self.near(places) } else { Vec::new() };
+                let near = if has_maps { self.near(places, &members_around) } else { Vec::new() };
                 let mut in_map = vec![false; self.blocks.len()];
                 near.iter().for_each(|&member| in_map[member as usize] = self.blocks[member as usize]);
                 let vertex = |&v: &u32| {
@@ -745,12 +854,13 @@ struct Lit {
 }
 
 impl Lit {
-    /// `surface` is the mesh, or finer: then `parents` has the mesh's triangle of each of its own.
-    fn new(mesh: &Mesh, surface: &Mesh, parents: Option<&[u32]>) -> Self {
+    /// `surface` is the mesh, or finer: then `parents` has the mesh's triangle of each of its own. `is_mixed` tells whether
+    /// vertices are of different sides.
+    fn new(mesh: &Mesh, surface: &Mesh, parents: Option<&[u32]>, is_mixed: &dyn Fn(&[u32]) -> bool) -> Self {
         let order = cluster_order(surface);
         let mut places = vec![0; order.len()];
         order.iter().zip(0..).for_each(|(&v, place)| places[v as usize] = place);
-        let mixed: Vec<bool> = order.chunks(RUNS[0]).map(|run| is_mixed(surface, run)).collect();
+        let mixed: Vec<bool> = order.chunks(RUNS[0]).map(is_mixed).collect();
         let mut counts = vec![0_u32; mesh.triangles.len()];
         let parent = |part: usize| parents.map_or(part, |parents| parents[part] as usize);
         (0..surface.triangles.len()).for_each(|part| counts[parent(part)] += 1);

@@ -172,8 +172,10 @@ impl SceneBuffers {
             drawn: baked.surface_of.iter().map(|&surface| baked.surfaces[surface].mesh.positions.len()).sum(),
         };
         let by_triangles = |surface: usize| {
+            let has_maps = baked.surfaces[surface].self_visibility.is_some();
             let mut entities = scene.entities.iter().zip(&baked.surface_of);
-            entities.any(|(entity, of)| *of == surface && (entity.reflection().is_some() || entity.transparent))
+            has_maps
+                || entities.any(|(entity, of)| *of == surface && (entity.reflection().is_some() || entity.transparent))
         };
         let surfaces = baked.surfaces.iter().enumerate();
         let surfaces = surfaces.map(|(index, surface)| packing.add(device, surface, by_triangles(index)));

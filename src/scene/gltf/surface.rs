@@ -54,7 +54,8 @@ pub struct Surface {
     /// How it reflects besides; an unlit surface does not.
     pub gloss: Option<Gloss>,
     pub is_double_sided: bool,
-    /// Whether an open shape that this covers has two sides in any case: it is cut out by a texture, as leaves are.
+    /// Whether an open shape that this covers has two sides in any case: it is cut out by a texture, as leaves are, or lets
+    /// light through, as panes do.
     pub has_backs: bool,
     /// Share of light that does not pass; a texture may be another factor.
     pub opacity: f32,
@@ -127,7 +128,8 @@ impl Surface {
         let alpha_cutoff = matches!(json.alpha_mode, Checked::Valid(AlphaMode::Mask))
             .then(|| (json.alpha_cutoff.map_or(0.5, |cutoff| cutoff.0) / alpha.max(1e-6)).clamp(0.0, 1.0));
         let alpha_blend = matches!(json.alpha_mode, Checked::Valid(AlphaMode::Blend));
-        let has_backs = json.double_sided && base.is_some() && (alpha_blend || alpha_cutoff.is_some());
+        let shows_backs = opacity < 1.0 || base.is_some() && (alpha_blend || alpha_cutoff.is_some());
+        let has_backs = json.double_sided && shows_backs;
         let paint = (base.is_some() || attributes.tints.is_some()).then(|| Paint {
             image: base.as_ref().map(|base| base.image),
             texture: Texture {

@@ -300,7 +300,12 @@ fn blended_and_transmissive_surfaces_let_light_through() {
     let half = json!({ "transmissionFactor": 0.8, "transmissionTexture": { "index": texture } });
     let glass = json!({ "KHR_materials_transmission": half });
     square(&mut model, json!({ "pbrMetallicRoughness": color(1.0), "extensions": glass }), false);
+    let pane = json!({ "alphaMode": "BLEND", "doubleSided": true, "pbrMetallicRoughness": color(0.25) });
+    square(&mut model, pane, false);
     let (scene, _) = model::scene(&model);
+    // Both sides of a pane are lit.
+    let has_backs = |entity: usize| scene.meshes[scene.entities[entity].mesh].is_two_sided();
+    assert!(!has_backs(0) && has_backs(4));
     for (entity, opacity, albedo) in [(0, 0.25, 0.125), (1, 1.0, 0.5), (2, 0.6, 0.1), (3, 0.8, 0.3)] {
         let found = &scene.entities[entity];
         assert!((found.opacity - opacity).abs() < 1e-6 && (found.albedo.x - albedo).abs() < 1e-6, "{found:?}");

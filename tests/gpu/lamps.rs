@@ -4,6 +4,7 @@ use crate::common::{Gpu, generate, gpu, inside_out, of_cells, of_quads, part, re
 use crate::stage::{shines, stands};
 use glam::{DQuat, Vec2, Vec3};
 use shadow_fields::asset::Mesh;
+use shadow_fields::asset::disc::Sun;
 use shadow_fields::asset::environment::EnvironmentData;
 use shadow_fields::asset::generate::Generator;
 use shadow_fields::bake;
@@ -382,4 +383,65 @@ fn a_pole_hides_the_part_of_its_lamp_that_it_reaches_into() {
         .entity(shines("lamp", [0.0, 1.52, 0.0], 30.0));
     let error = picture_error(&gpu, &scene.build().unwrap());
     assert!(error < 0.1, "{error}");
+}
+
+/// A strip of sun 0.2 m wide comes through the roof of a hall. What it meets throws light by its area, not by how many
+/// vertices it happens to meet, and none of the sun that lies on the walls above the roof gets in: the mean over what no
+/// sun meets was 4.8 times that of rays.
+#[test]
+fn a_hall_is_lit_by_the_strip_of_sun_on_its_floor() {
+    let Some(gpu) = gpu() else { return };
+    let slab = |x: f32, y: f32, z: f32| Generator::Cuboid { size_m: Vec3::new(x, y, z), cells: 1 };
+    let sun = Sun { radiance: Vec3::splat(3e4), toward: Vec3::new(0.5, 1.0, 0.1), angle_deg: 1.0 };
+    let turn = turned(Vec3::Y, 90.0);
+    let scene = Scene::builder()
+        .environment(EnvironmentData { sun: Some(sun), ..EnvironmentData::default() })
+        .camera(Camera { fov_deg: 60.0, ..Camera::new([-7.0, 1.2, 5.0], [1.0, 1.6, -1.0]) })
+        .mesh("floor", slab(16.4, 0.2, 12.4))
+        .mesh("long wall", slab(16.4, 5.0, 0.2))
+        .mesh("wall", slab(12.4, 5.0, 0.2))
+        .mesh("roof", slab(7.8, 0.5, 12.0))
+        .entity(stands("floor", [0.0, -0.1, 0.0]))
+        .entity(stands("long wall", [0.0, 2.5, -6.1]))
+        .entity(stands("long wall", [0.0, 2.5, 6.1]))
+        .entity(EntityData { rotation: turn.clone(), ..stands("wall", [-8.1, 2.5, 0.0]) })
+        .entity(EntityData { rotation: turn, ..stands("wall", [8.1, 2.5, 0.0]) })
+        .entity(stands("roof", [-4.1, 4.0, 0.0]))
+        .entity(stands("roof", [4.1, 4.0, 0.0]))
+        .build()
+        .unwrap();
+    let bounces = Bounces::One;
+    let bake = bake::Options { groups: true, vertices: 20_000, ..bake::Options::default() };
+    let options = frame::Options { size: [96, 64], bake, bounces, ..frame::Options::default() };
+    let found = gpu.picture(&scene, options, f32::INFINITY);
+    let world = World::of(&scene, &scene.at(0.0));
+    let cast = RayCast { rays: 256, runs: 2, bounces: 1, ..RayCast::default() };
+    let rays = pixels::picture(&world, [96, 64], true, &cast, &|_| ());
+    let dark = found.iter().zip(&rays.linear).filter(|(found, truth)| found.max(**truth) < 0.05);
+    let [mine, theirs] = dark.fold([0.0, 0.0], |[a, b], (found, truth)| [a + found, b + truth]);
+    let ratio = mine / theirs;
+    assert!((0.6..1.6).contains(&ratio), "{ratio}");
+}
+
+/// The sun falls through a hole in a cave onto a pool, which is a grid: before the cave, which is around the pool, its
+/// outline hid the half of it (0.55).
+#[test]
+fn sun_through_the_hole_of_a_cave_lights_a_pool() {
+    let Some(gpu) = gpu() else { return };
+    let ball = generate::sphere(2.0, 5);
+    let toward = Vec3::new(0.3, 1.0, 0.2).normalize();
+    let is_hole = |corners: &[u32; 3]| {
+        let middle = corners.iter().map(|&v| ball.positions[v as usize]).sum::<Vec3>();
+        middle.normalize().dot(toward) > 20.0_f32.to_radians().cos()
+    };
+    let sun = Sun { radiance: Vec3::splat(9e3), toward, angle_deg: 1.0 };
+    let scene = Scene::builder()
+        .environment(EnvironmentData { sun: Some(sun), ..EnvironmentData::default() })
+        .camera(Camera { fov_deg: 70.0, ..Camera::new([-1.2, 0.3, 1.2], [0.2, -0.8, -0.1]) })
+        .mesh("cave", inside_out(&part(&ball, |corners| !is_hole(corners))))
+        .mesh("pool", Generator::Plane { size_m: 2.4, cells: 12 })
+        .entity(EntityData::of_mesh("cave"))
+        .entity(stands("pool", [0.0, -0.8, 0.0]));
+    let error = picture_error(&gpu, &scene.build().unwrap());
+    assert!(error < 0.35, "{error}");
 }

@@ -5,8 +5,8 @@ use glam::{DQuat, DVec3, Vec3};
 use rayon::prelude::*;
 use std::f64::consts::{PI, TAU};
 
-/// Width and height of maps of closed forms, texels: 0.18 degrees each.
-const SIZE: [usize; 2] = [2048, 1024];
+/// Width and height of maps of closed forms, which are smooth but at the horizon, texels: 0.35 degrees each.
+const SIZE: [usize; 2] = [1024, 512];
 /// Width of maps of pictures at most, texels. A map of 4096 takes 67 MB on a device.
 const WIDEST: usize = 4096;
 

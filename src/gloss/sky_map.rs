@@ -11,13 +11,13 @@ use rayon::prelude::*;
 
 /// Texels along a side of a level. One more on each side continues it, for bilinear reads.
 pub const SIDE: usize = 256;
-/// Texels along a side that wide lobes need, and the first level that has such.
-const WIDE_SIDE: usize = 64;
-const FIRST_WIDE: usize = 2;
+/// Texels along a side that the lobes of levels need, the last one of all further levels; they are filtered so, and
+/// interpolated to [`SIDE`].
+const SIDES: [usize; 3] = [SIDE, 128, 64];
 /// Coefficients of a product's rows and columns: four bands.
 const COUNT: usize = 16;
 /// Texels along a side of the map that is filtered, and of the coarser one that wide lobes take.
-const FINE: usize = 256;
+const FINE: usize = 128;
 const COARSE: usize = 32;
 /// Least width of lobes that take the coarser map.
 const WIDE: f64 = 0.1;
@@ -67,12 +67,6 @@ fn coarser(fine: &[Cell]) -> Vec<Cell> {
     (0..COARSE * COARSE).map(cell).collect()
 }
 
-/// The radiance of the cell of [`FINE`] in a direction.
-fn radiance_at(fine: &[Cell], toward: DVec3) -> DVec3 {
-    let at = place(toward) * FINE as f64;
-    fine[(at.y as usize).min(FINE - 1) * FINE + (at.x as usize).min(FINE - 1)].radiance
-}
-
 /// What a microfacet reflection of that width sees along its axis, weighed by the cosine.
 fn filtered(axis: DVec3, alpha: f64, fine: &[Cell], coarse: &[Cell]) -> DVec3 {
     let mut light = DVec3::ZERO;
@@ -95,7 +89,9 @@ fn filtered(axis: DVec3, alpha: f64, fine: &[Cell], coarse: &[Cell]) -> DVec3 {
         let u = (i as f64 + 0.5) / SAMPLES as f64;
         let local = brdf::reflected(alpha.max(brdf::LEAST_ALPHA), DVec3::Z, u, turn);
         if local.z > 0.0 {
-            light += local.z * radiance_at(fine, local.x * across + local.y * along + local.z * axis);
+            let at = place(local.x * across + local.y * along + local.z * axis) * FINE as f64;
+            let cell = (at.y as usize).min(FINE - 1) * FINE + (at.x as usize).min(FINE - 1);
+            light += local.z * fine[cell].radiance;
             whole += local.z;
         }
     }
@@ -138,14 +134,11 @@ impl SkyMap {
         let fine = cells(environment, FINE);
         let coarse = coarser(&fine);
         let level = |level: usize| match level {
-            0 => level_of(SIDE, |axis| radiance_at(&fine, axis)),
+            0 => level_of(SIDE, |axis| DVec3::from_array(environment.radiance(axis))),
             _ => {
-                let lobe = |axis| filtered(axis, level_alpha(level as f64), &fine, &coarse);
-                if level < FIRST_WIDE {
-                    return level_of(SIDE, lobe);
-                }
-                let texels = level_of(WIDE_SIDE, lobe);
-                level_of(SIDE, |axis| bilinear(&texels, WIDE_SIDE, axis))
+                let side = SIDES[level.min(SIDES.len() - 1)];
+                let texels = level_of(side, |axis| filtered(axis, level_alpha(level as f64), &fine, &coarse));
+                level_of(SIDE, |axis| bilinear(&texels, side, axis))
             }
         };
         let levels: Vec<DVec3> = (0..LEVELS).flat_map(level).collect();

@@ -109,7 +109,7 @@ fn nothing_in_view_is_a_picture_too() {
     let is_sky = |(pixel, found): (usize, &[f32; 3])| {
         let toward = through([(pixel % WIDTH) as f64 + 0.5, (pixel / WIDTH) as f64 + 0.5]);
         let wanted = Vec3::new(0.1, 0.2, 0.3) + (0.2 + 0.8 * toward.y.max(0.0) as f32) * Vec3::new(1.0, 0.5, 0.0);
-        // Texels are 0.18 degrees wide, and half floats have 11 bits.
+        // Texels are 0.35 degrees wide, and half floats have 11 bits.
         Vec3::from_array(*found).distance(wanted) < 5e-3
     };
     let is_background = |picture: &[f32]| picture.as_chunks().0.iter().enumerate().all(is_sky);

@@ -138,7 +138,8 @@ fn a_picture_is_refined_once_nothing_moves() {
     let Some(mut stand) = Stand::with("refined", coarse) else { return };
     stand.ready();
     assert!(!stand.viewer.is_refined());
-    let before = stand.shown();
+    let scene = stand.viewer.editor.scene().clone();
+    let before = stand.rendered(&scene);
     stand.until("a refined picture", Viewer::is_refined);
     let refined = stand.shown();
     assert!(apart(&before, &refined) > 20, "edges are as they were");

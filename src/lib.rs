@@ -32,10 +32,11 @@
 //!   shell ([`field::Area`]). Up to 16 degrees the point and the field share.
 //! - Rigid groups: entities without motion are one group, and so are those that the same nodes carry. A vertex's own
 //!   visibility is cast by rays past its whole group, so members leave each other's chains; under sharp lights a member
-//!   that is convex, or farther than 0.65 of its bounding radii, keeps its silhouette. What moves among many of them
-//!   reads the sky past all at once, from nodes of the box in which it moves ([`field::visibility_volume`]). With
-//!   `--lights sh`, and without the skip `static`, every entity is alone.
-//! - Surfaces: a mesh is lit and drawn with more vertices where its own visibility varies ([`bake::surfaces`]).
+//!   that is convex, or farther than 0.65 of its bounding radii and not around what it blocks, keeps its silhouette.
+//!   What moves among many of them reads the sky past all at once, from nodes of the box in which it moves
+//!   ([`field::visibility_volume`]). With `--lights sh`, and without the skip `static`, every entity is alone.
+//! - Surfaces: a mesh is lit and drawn with more vertices where its own visibility varies, and along the shadows of suns
+//!   ([`bake::surfaces`]).
 //! - Entities: everything receives, and everything but emitters occludes. Each can be set per entity. Scales are uniform
 //!   and positive.
 //! - Transparency: what lets light through blocks its opacity's share of a field or an outline. It stands before all

@@ -1,6 +1,7 @@
 //! Distant light as a picture shows it behind a scene: an equirectangular map.
 
 use super::environment::Environment;
+use super::equirect::direction;
 use glam::{DQuat, DVec3, Vec3};
 use rayon::prelude::*;
 use std::f64::consts::{PI, TAU};
@@ -37,7 +38,7 @@ impl Backdrop {
                 let offset = |k: usize| (k as f64 + 0.5) / step as f64;
                 let column = (index % size[0]) as f64 + offset(k % step);
                 let row = (index / size[0]) as f64 + offset(k / step);
-                DVec3::from_array(environment.radiance(turn * toward(column / size[0] as f64, row / size[1] as f64)))
+                DVec3::from_array(environment.radiance(turn * direction(column / size[0] as f64, row / size[1] as f64)))
             };
             let sum: DVec3 = (0..step * step).map(part).sum();
             (sum / (step * step) as f64).as_vec3()
@@ -68,13 +69,6 @@ impl Backdrop {
         let along = |y: f64| texel(column.floor(), y).lerp(texel(column.floor() + 1.0, y), column - column.floor());
         along(row.floor()).lerp(along(row.floor() + 1.0), row - row.floor())
     }
-}
-
-/// Unit direction of a place on the map, both from 0 to 1.
-fn toward(u: f64, v: f64) -> DVec3 {
-    let (across, ahead) = (TAU * (u - 0.5)).sin_cos();
-    let (level, up) = (PI * v).sin_cos();
-    DVec3::new(level * across, up, -level * ahead)
 }
 
 #[cfg(test)]
@@ -121,10 +115,10 @@ mod tests {
         assert_eq!(environment.discs().len(), 1);
         let backdrop = Backdrop::new(&environment).unwrap();
         let turn = backdrop.turn.inverse();
-        let at = |x: f64, y: f64| backdrop.radiance(turn * toward(x / 64.0, y / 32.0)).x;
+        let at = |x: f64, y: f64| backdrop.radiance(turn * direction(x / 64.0, y / 32.0)).x;
         assert!((at(24.0, 15.0) - 100.0).abs() < 1.0, "{}", at(24.0, 15.0));
         assert!((at(30.0, 15.0) - 0.5).abs() < 0.01, "{}", at(30.0, 15.0));
-        assert!(environment.radiance(turn * toward(24.0 / 64.0, 15.0 / 32.0))[0] < 1.0);
+        assert!(environment.radiance(turn * direction(24.0 / 64.0, 15.0 / 32.0))[0] < 1.0);
     }
 
     #[test]

@@ -43,6 +43,13 @@ pub struct Equirect {
     coefficients: [Vec<f64>; 3],
 }
 
+/// Unit direction of a place on a picture, both from 0 to 1.
+pub(super) fn direction(u: f64, v: f64) -> DVec3 {
+    let (across, ahead) = (TAU * (u - 0.5)).sin_cos();
+    let (level, up) = (PI * v).sin_cos();
+    DVec3::new(level * across, up, -level * ahead)
+}
+
 /// Longest edge of the tiles that an OpenEXR file claims, in pixels: the decoder makes room for a tile before it looks
 /// at the picture's size.
 fn widest_tile(bytes: &[u8]) -> Option<u32> {
@@ -98,11 +105,7 @@ impl Equirect {
     fn take_out_lights(&mut self) -> (Vec<Disc>, Vec<(usize, [f32; 3])>) {
         let width = self.width as f64;
         let height = self.height as f64;
-        let direction = |x: usize, y: usize| {
-            let (across, ahead) = (TAU * ((x as f64 + 0.5) / width - 0.5)).sin_cos();
-            let (level, up) = (PI * (y as f64 + 0.5) / height).sin_cos();
-            DVec3::new(level * across, up, -level * ahead)
-        };
+        let direction = |x: usize, y: usize| direction((x as f64 + 0.5) / width, (y as f64 + 0.5) / height);
         Sky::new(&mut self.texels, [self.width, self.height], &direction).take_out_lights()
     }
 

@@ -89,9 +89,9 @@ mod tests {
         let backdrop = Backdrop::new(&environment).unwrap();
         for i in 0..500 {
             let up = 1.0 - (f64::from(i) + 0.5) / 250.0;
-            let (sin, cos) = (2.4 * f64::from(i)).sin_cos();
-            let across = (1.0 - up * up).sqrt();
-            let toward = DVec3::new(across * cos, up, across * sin);
+            let level = (1.0 - up * up).sqrt();
+            let azimuth = 2.4 * f64::from(i);
+            let toward = DVec3::new(level * azimuth.cos(), up, level * azimuth.sin());
             let wanted = DVec3::from_array(environment.radiance(toward));
             let off = backdrop.radiance(toward).distance(wanted);
             assert!(off < 0.01 * wanted.length(), "{toward}: {off}");

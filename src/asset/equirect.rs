@@ -45,9 +45,9 @@ pub struct Equirect {
 
 /// Unit direction of a place on a picture, both from 0 to 1.
 pub(super) fn direction(u: f64, v: f64) -> DVec3 {
-    let (across, ahead) = (TAU * (u - 0.5)).sin_cos();
-    let (level, up) = (PI * v).sin_cos();
-    DVec3::new(level * across, up, -level * ahead)
+    let azimuth = TAU * (u - 0.5);
+    let polar = PI * v;
+    DVec3::new(polar.sin() * azimuth.sin(), polar.cos(), -polar.sin() * azimuth.cos())
 }
 
 /// Longest edge of the tiles that an OpenEXR file claims, in pixels: the decoder makes room for a tile before it looks

@@ -180,11 +180,16 @@ fn cells_of(side: usize) -> Vec<Cell> {
 
 static FEW_RAYS: LazyLock<Vec<PatternRay>> = LazyLock::new(|| rays(16));
 
+/// Unit directions all over the sphere, an even number of at most 512.
+pub(super) fn directions(count: usize) -> impl Iterator<Item = Vec3A> {
+    let upper = FEW_RAYS.iter().map(|ray| ray.local);
+    upper.clone().chain(upper.map(|toward| -toward)).step_by(2 * FEW_RAYS.len() / count)
+}
+
 /// Rays all over the sphere, each of which weighs its solid angle.
 pub(super) fn sphere() -> Vec<PatternRay> {
     let solid_angle = TAU / FEW_RAYS.len() as f64;
-    let upper = FEW_RAYS.iter().map(|ray| ray.local.as_dvec3());
-    upper.clone().chain(upper.map(|toward| -toward)).map(|toward| PatternRay::new(toward, solid_angle)).collect()
+    directions(2 * FEW_RAYS.len()).map(|toward| PatternRay::new(toward.as_dvec3(), solid_angle)).collect()
 }
 
 static MANY_RAYS: LazyLock<Pattern> = LazyLock::new(Pattern::new);

@@ -66,6 +66,10 @@ fn edge(a: u32, b: u32) -> Edge {
     (a.min(b), a.max(b))
 }
 
+fn sides([a, b, c]: [u32; 3]) -> [Edge; 3] {
+    [edge(a, b), edge(b, c), edge(c, a)]
+}
+
 impl Refined {
     pub fn new(mesh: &Mesh) -> Self {
         let mut refined = Refined {
@@ -113,7 +117,7 @@ impl Refined {
     }
 
     fn edges(&self) -> HashSet<Edge> {
-        self.triangles.iter().flat_map(|[a, b, c]| [edge(*a, *b), edge(*b, *c), edge(*c, *a)]).collect()
+        self.triangles.iter().flat_map(|triangle| sides(*triangle)).collect()
     }
 
     /// Casts rays from the vertices that have no transfer vector yet, and from the middles of edges longer than
@@ -181,7 +185,7 @@ impl Refined {
                 lit.any(|lit| Some(lit) != first)
             })
         };
-        let longest = |[a, b, c]: &[u32; 3]| self.longest(&[edge(*a, *b), edge(*b, *c), edge(*c, *a)]);
+        let longest = |triangle: &[u32; 3]| self.longest(&sides(*triangle));
         let is_open = |triangle: &&[u32; 3]| self.length(longest(triangle)) > least_m && !even.contains(*triangle);
         let open: Vec<[u32; 3]> = self.triangles.iter().filter(is_open).copied().collect();
         let (half_lit, others): (Vec<_>, Vec<_>) = open.into_par_iter().partition(is_half_lit);
@@ -193,8 +197,8 @@ impl Refined {
     fn split(&mut self, mut marked: HashSet<Edge>) {
         loop {
             let before = marked.len();
-            for &[a, b, c] in &self.triangles {
-                let sides = [edge(a, b), edge(b, c), edge(c, a)];
+            for triangle in &self.triangles {
+                let sides = sides(*triangle);
                 if sides.iter().any(|side| marked.contains(&self.shared(*side))) {
                     marked.insert(self.shared(self.longest(&sides)));
                 }
@@ -209,10 +213,8 @@ impl Refined {
             std::mem::take(&mut self.triangles).into_iter().zip(std::mem::take(&mut self.parents)).collect();
         open.reverse();
         while let Some(([a, b, c], parent)) = open.pop() {
-            let sides: Vec<Edge> = [edge(a, b), edge(b, c), edge(c, a)]
-                .into_iter()
-                .filter(|side| marked.contains(&self.shared(*side)))
-                .collect();
+            let mut sides = sides([a, b, c]).to_vec();
+            sides.retain(|side| marked.contains(&self.shared(*side)));
             if sides.is_empty() {
                 done.push(([a, b, c], parent));
                 continue;
@@ -272,12 +274,14 @@ pub(super) struct Limits {
     pub sun_edge: f32,
 }
 
+fn vertex_count(surfaces: &[(Refined, GroupSpace<'_>, bool)]) -> usize {
+    surfaces.iter().map(|(refined, ..)| refined.positions.len()).sum()
+}
+
 /// Splits triangles on which a sun shines in parts. The light that bounces off a surface is that of its vertices: through
 /// a window between two of them no sun would come in, and through one with a vertex it would shine on all that is nearest
 /// to that.
 fn follow_suns(surfaces: &mut [(Refined, GroupSpace<'_>, bool)], suns: &[DVec3], limits: &Limits, budget: usize) {
-    let count =
-        |surfaces: &[(Refined, GroupSpace<'_>, bool)]| surfaces.iter().map(|s| s.0.positions.len()).sum::<usize>();
     let mut even = vec![HashSet::new(); surfaces.len()];
     loop {
         let mut all_even = true;
@@ -286,7 +290,7 @@ fn follow_suns(surfaces: &mut [(Refined, GroupSpace<'_>, bool)], suns: &[DVec3],
             all_even &= marked.is_empty();
             refined.split(marked);
         }
-        if all_even || count(surfaces) >= budget {
+        if all_even || vertex_count(surfaces) >= budget {
             break;
         }
     }
@@ -300,9 +304,7 @@ pub(super) fn refine(
     limits: &Limits,
     told: &dyn Fn(usize),
 ) {
-    let count =
-        |surfaces: &[(Refined, GroupSpace<'_>, bool)]| surfaces.iter().map(|s| s.0.positions.len()).sum::<usize>();
-    let start = count(surfaces);
+    let start = vertex_count(surfaces);
     if start >= limits.vertices {
         return;
     }
@@ -313,12 +315,12 @@ pub(super) fn refine(
         refined.cut_longest(most / space.scale(), budget);
     }
     if !suns.is_empty() {
-        let budget = count(surfaces) + (limits.vertices - start) / SUNS_SHARE;
+        let budget = vertex_count(surfaces) + (limits.vertices - start) / SUNS_SHARE;
         follow_suns(surfaces, suns, limits, budget);
     }
     let area: f32 = surfaces.iter().map(|(refined, space, _)| refined.area() * space.scale().powi(2)).sum();
     loop {
-        let before = count(surfaces);
+        let before = vertex_count(surfaces);
         told(before);
         if before >= limits.vertices {
             break;
@@ -346,7 +348,7 @@ pub(super) fn refine(
                 refined.split(marked);
             }
         }
-        if count(surfaces) == before {
+        if vertex_count(surfaces) == before {
             break;
         }
     }

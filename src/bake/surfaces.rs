@@ -3,7 +3,7 @@
 
 use super::cluster_order::cluster_order;
 use super::links::{Link, Met, RUNS, Runs, links};
-use super::own_visibility::{Counts, Eye, Front, PATTERN, Rays, Seen, Standing, Target, see, sphere};
+use super::own_visibility::{Counts, Eye, Front, PATTERN, Rays, Seen, Standing, Target, directions, see};
 use super::packet::{BlockerHit, BlockerTriangle, Blockers, Mask};
 use super::refine::{FLAT, Limits, Refined, refine};
 use super::triangles::{distinct, weights};
@@ -419,7 +419,7 @@ impl GroupPlan {
             let tell = |vertices: usize| {
                 progress((total + done + vertices) as u32 / 2, total.max(1) as u32);
             };
-            surfaces[member] = group.space(member).surface(mesh, self.wanted, (&lit, &runs), &tell);
+            surfaces[member] = spaces[member].surface(mesh, &nudges[member], self.wanted, (&lit, &runs), &tell);
             done += surfaces[member].mesh.positions.len();
         }
         let report = BakeReport { samples: total as u32, total: started.elapsed(), ..Default::default() };
@@ -599,8 +599,7 @@ impl GroupSpace<'_> {
 
     fn see_with(&self, position: Vec3, normal: Vec3, nudge: Vec3, rays: Rays, in_map: Option<&[bool]>) -> Seen {
         let group = self.group;
-        let world = self.own().placement.point((position + nudge).as_dvec3());
-        let eye = Eye { origin: group.place(world).into(), normal };
+        let eye = Eye { origin: self.placed(position + nudge).into(), normal };
         let standing = &group.standings[self.member];
         let counts = Counts { blocks: &self.blocks, in_map, targets: &group.targets, screens: &group.screens };
         let mut seen = see(&group.blockers, standing, &eye, group.plan.bands, rays, counts);
@@ -629,11 +628,15 @@ impl GroupSpace<'_> {
         others.iter().any(|v| self.first_between(counts, place(first), place(v)).is_some())
     }
 
+    /// A point of the member's frame in the group's.
+    fn placed(&self, point: Vec3) -> Vec3A {
+        self.group.place(self.own().placement.point(point.as_dvec3()))
+    }
+
     /// Whether the way from a point of the member's frame towards a sun is free.
     pub fn sees(&self, point: Vec3, sun: DVec3) -> bool {
-        let from = self.group.place(self.own().placement.point(point.as_dvec3()));
         let mut hits = Vec::with_capacity(1);
-        self.group.blockers.first(from, &Mat3A::IDENTITY, &[sun.as_vec3a()], &self.blocks, &mut hits);
+        self.group.blockers.first(self.placed(point), &Mat3A::IDENTITY, &[sun.as_vec3a()], &self.blocks, &mut hits);
         hits[0].is_none()
     }
 
@@ -644,7 +647,7 @@ impl GroupSpace<'_> {
 
     /// The first of those members that count.
     fn first_between(&self, counts: &[bool], from: Vec3, to: Vec3) -> Option<BlockerHit> {
-        let [from, to] = [from, to].map(|place| self.group.place(self.own().placement.point(place.as_dvec3())));
+        let [from, to] = [from, to].map(|point| self.placed(point));
         let mut hits = Vec::with_capacity(1);
         let toward = (to - from).normalize_or_zero();
         self.group.blockers.first(from, &Mat3A::IDENTITY, &[toward], counts, &mut hits);
@@ -669,16 +672,10 @@ impl GroupSpace<'_> {
     /// Other members that are around this one, of those that keep no outline.
     fn around(&self, mesh: &Mesh, nudges: &[Vec3]) -> Vec<bool> {
         let group = self.group;
-        let rays = sphere();
-        let toward: Vec<Vec3A> = rays.iter().step_by(rays.len() / LOOKS[1]).map(|ray| ray.local).collect();
+        let toward: Vec<Vec3A> = directions(LOOKS[1]).collect();
         let step = mesh.positions.len().div_ceil(LOOKS[0]);
-        let origins: Vec<Vec3A> = mesh
-            .positions
-            .iter()
-            .zip(nudges)
-            .step_by(step)
-            .map(|(p, nudge)| group.place(self.own().placement.point((*p + *nudge).as_dvec3())))
-            .collect();
+        let origins: Vec<Vec3A> =
+            mesh.positions.iter().zip(nudges).step_by(step).map(|(p, nudge)| self.placed(*p + *nudge)).collect();
         let is_around = |member: usize| {
             let (middle, reach) = group.spheres[member];
             let mut counts = vec![false; self.blocks.len()];
@@ -723,20 +720,20 @@ impl GroupSpace<'_> {
     fn surface(
         &self,
         mesh: Arc<Mesh>,
+        nudges: &[Vec3],
         wanted: Wanted,
         (lit, runs): (&[Lit], &Runs),
         told: &dyn Fn(usize),
     ) -> BakedSurface {
         let plan = self.group.plan;
         let order = &lit[self.member].order;
-        let nudges = self.nudges(&mesh.positions, &mesh.normals, &mesh.triangles);
         // Few meshes have buried vertices, which alone ask for their triangles.
         let around = OnceLock::new();
         let stride = channel_stride(plan.bands);
         let mut transfer = vec![0.0; mesh.positions.len() * stride];
         // Pixels of a grid read no maps: all members cast their own shadows there, whose edges are crisp. One with maps is
         // drawn by its triangles.
-        let members_around = self.around(&mesh, &nudges);
+        let members_around = if wanted.self_visibility { self.around(&mesh, nudges) } else { Vec::new() };
         let is_grid = || Grid::find(&mesh).is_some();
         let has_maps = wanted.self_visibility && (members_around.contains(&true) || !is_grid());
         let mut maps = vec![0; if has_maps { mesh.positions.len() * BYTES } else { 0 }];

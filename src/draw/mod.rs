@@ -388,8 +388,9 @@ impl Draw {
         colors.chain([(&self.depth, Access::DepthWrite)])
     }
 
-    /// Draws all viewports, one after the other, over a background of one colour and alpha where they have no sky. Radiance above `white` is
-    /// brought down to it, hue kept. Between the render passes of a large picture stand barriers of the pass's own.
+    /// Draws all viewports, one after the other, over a background of one colour and alpha where they have no sky. Radiance
+    /// above `white` is brought down to it, hue kept. Between the render passes of a large picture stand barriers of the
+    /// pass's own.
     pub fn record<'r>(
         &'r self,
         commands: &mut Commands<'r>,

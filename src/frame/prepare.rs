@@ -69,10 +69,10 @@ impl Frame {
             self.prepare_merge(placements)?;
             self.fit_lists()?;
         }
-        if viewports.iter().any(Viewport::shows_light) && !std::mem::replace(&mut self.picture.draw.is_made, true) {
-            self.picture.make_pipelines(&self.scene, &self.buffers, self.reflections.is_some())?;
-        }
         if viewports.iter().any(Viewport::shows_light) {
+            if !std::mem::replace(&mut self.picture.draw.is_made, true) {
+                self.picture.make_pipelines(&self.scene, &self.buffers, self.reflections.is_some())?;
+            }
             self.sky.prepare(&self.device, &self.scene)?;
         }
         if !viewports.is_empty() {

@@ -208,6 +208,8 @@ impl EntityPush {
 pub struct DrawnViewport<'d> {
     /// Left, top, width and height in pixels.
     pub area: [u32; 4],
+    /// What of it is drawn.
+    pub drawn: [u32; 4],
     /// The entities that are drawn, in this order: transparent ones last, from far to near.
     pub entities: Vec<DrawnEntity<'d>>,
     pub radiosity: &'d Buffer,
@@ -425,7 +427,7 @@ impl Draw {
                 for (viewport, entity, indices) in batch {
                     let light = self.light_of(viewport, entity);
                     if bound.is_none_or(|bound| !std::ptr::eq(bound, entity)) {
-                        drawing.area(viewport.area);
+                        drawing.part_of(viewport.area, viewport.drawn, 1);
                         if let DrawnMesh::Triangles(mesh) = entity.mesh {
                             let layer = DrawnLayer::Opaque { light };
                             self.triangles.bind(
@@ -452,7 +454,7 @@ impl Draw {
                 }
                 for viewport in viewports {
                     if let Some(sky) = &viewport.sky {
-                        drawing.area(viewport.area);
+                        drawing.part_of(viewport.area, viewport.drawn, 1);
                         self.sky.record(drawing, sky, white)?;
                     }
                 }
@@ -472,7 +474,7 @@ impl Draw {
         for viewport in viewports {
             for entity in viewport.entities.iter().filter(|entity| entity.transparent && !entity.indices.is_empty()) {
                 let DrawnMesh::Triangles(mesh) = entity.mesh else { continue };
-                drawing.area(viewport.area);
+                drawing.part_of(viewport.area, viewport.drawn, 1);
                 // Of one entity the nearest place alone is seen, in whatever order its triangles come.
                 for layer in [DrawnLayer::Depth, DrawnLayer::Over] {
                     self.triangles.bind(drawing, mesh, entity, viewport, self.mirrors.as_deref(), white, layer)?;

@@ -285,7 +285,7 @@ impl LightImages {
     ) -> Result<()> {
         for viewport in viewports {
             let Some(light) = &viewport.pixel else { continue };
-            drawing.area_of_texels(viewport.area, texel_px);
+            drawing.part_of(viewport.area, viewport.drawn, texel_px);
             for entity in viewport.entities.iter().filter(|entity| !entity.indices.is_empty()) {
                 if let Some(by_pixel) = entity.by_pixel {
                     self.draw_entity(drawing, viewport, light, entity, by_pixel, way)?;

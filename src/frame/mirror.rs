@@ -7,7 +7,7 @@ use super::{Frame, gloss};
 use crate::asset::edges::within_picture;
 use crate::asset::mesh::Mesh;
 use crate::bounce::Bounces;
-use crate::draw::mirror::{Mirrored, PROBE_ZOOM, finest_side};
+use crate::draw::mirror::{self, Mirrored, PROBE_ZOOM, finest_side};
 use crate::draw::triangles::Detail;
 use crate::draw::{DrawnEntity, DrawnViewport, PictureLights};
 use crate::gloss::{PIXEL_ROUGHNESS, brdf};
@@ -37,6 +37,10 @@ const SAME_PLANE: f64 = 1e-3;
 const CLIPPED: f64 = 2.0 * SAME_PLANE;
 /// Share of a mirror's score above the least one at which it is shown whole.
 const FADE: f64 = 0.2;
+/// Slopes of a mirror's microfacets, in texels at a distance of 1, below which shadows in it have edges that are seen,
+/// and the reflectance above which they are.
+const CRISP_PX: f64 = 12.0;
+const CRISP_REFLECTANCE: f64 = 0.1;
 
 /// A flat face of a glossy entity.
 pub(super) struct Face {
@@ -60,6 +64,21 @@ pub(super) struct Mirror {
     entities: Vec<usize>,
     /// Share of its picture in what it reflects: less than 1 for one that is hardly seen.
     share: f64,
+    /// Whether its pixels evaluate lights.
+    crisp: bool,
+}
+
+/// What may become a mirror of the next picture.
+struct Candidate {
+    place: Place,
+    /// Those that have faces there.
+    entities: Vec<usize>,
+    /// Share of the picture's light that it reflects.
+    score: f64,
+    /// Reflectance of what reflects most.
+    reflectance: f64,
+    /// Least and largest corner of its faces in a picture that lies between -1 and 1.
+    bounds: [DVec2; 2],
 }
 
 enum Shape {
@@ -78,6 +97,8 @@ enum Place {
 
 /// The eye's mirror image behind a plane.
 struct Plane {
+    /// What of its picture is read: left, top, width and height in texels of its part.
+    read: [u32; 4],
     camera: SightCamera,
     /// Unit normal on the eye's side, and offset from the world's origin.
     plane: DVec4,
@@ -144,8 +165,8 @@ fn flat_faces(mesh: &Mesh) -> (Vec<([DVec3; 4], DVec3)>, f64) {
     (planes.into_iter().take(MOST_FACES).map(rectangle).collect(), flat_m2 / whole_m2)
 }
 
-/// The share of a picture that a polygon covers.
-fn share_of_picture(clip_from_world: DMat4, corners: [DVec3; 4]) -> f64 {
+/// The corners of a polygon in a picture that lies between -1 and 1, without what lies outside of that.
+fn within(clip_from_world: DMat4, corners: [DVec3; 4]) -> Vec<DVec2> {
     let mut polygon: Vec<DVec4> = corners.iter().map(|corner| clip_from_world * corner.extend(1.0)).collect();
     for side in 0..5 {
         let mut kept = Vec::with_capacity(polygon.len() + 1);
@@ -160,7 +181,11 @@ fn share_of_picture(clip_from_world: DMat4, corners: [DVec3; 4]) -> f64 {
         }
         polygon = kept;
     }
-    let flat: Vec<DVec2> = polygon.iter().map(|p| p.truncate().truncate() / p.w).collect();
+    polygon.iter().map(|p| p.truncate().truncate() / p.w).collect()
+}
+
+/// The share of that picture within a polygon.
+fn share_of_picture(flat: &[DVec2]) -> f64 {
     let twice: f64 = flat.iter().zip(flat.iter().cycle().skip(1)).map(|(a, b)| a.perp_dot(*b)).sum();
     twice.abs() / 8.0
 }
@@ -183,8 +208,8 @@ impl Mirror {
 }
 
 impl Plane {
-    /// The mirror of a plane as a camera sees it; `part` is the size of its picture in pixels.
-    fn new(seen: &SightCamera, plane: DVec4, part: [u32; 2]) -> Self {
+    /// The mirror of a plane as a camera sees it; `part` is the size of its picture in texels.
+    fn new(seen: &SightCamera, plane: DVec4, part: [u32; 2], read: [u32; 4]) -> Self {
         let height_m = plane.dot(seen.eye.extend(1.0));
         let eye = seen.eye - 2.0 * height_m * plane.truncate();
         let mut clip = (seen.clip_from_world * reflection(plane)).transpose();
@@ -204,8 +229,31 @@ impl Plane {
         clip.z_axis = clip.w_axis - depth_step * above;
         let camera =
             SightCamera { clip_from_world: clip.transpose(), eye, near_m: seen.near_m, size: part, samples: false };
-        Plane { camera, plane, height_m, depth_step }
+        Plane { read, camera, plane, height_m, depth_step }
     }
+}
+
+impl Candidate {
+    /// Adds another one with the same plane.
+    fn join(&mut self, other: Candidate) {
+        self.entities.extend(other.entities);
+        self.score += other.score;
+        self.reflectance = self.reflectance.max(other.reflectance);
+        self.bounds = [self.bounds[0].min(other.bounds[0]), self.bounds[1].max(other.bounds[1])];
+    }
+}
+
+/// Left, top, width and height of what lies within bounds of a picture between -1 and 1, and a rim around it, in texels of
+/// one of that size.
+fn texels_within(bounds: [DVec2; 2], size: [u32; 2], rim: u32) -> [u32; 4] {
+    let ends = |axis: usize| {
+        let at = bounds.map(|corner| 0.5 * (corner[axis] + 1.0) * f64::from(size[axis]));
+        let first = (at[0].floor() as u32).saturating_sub(rim);
+        [first, (at[1].ceil() as u32 + rim).min(size[axis]).saturating_sub(first)]
+    };
+    let [left, width] = ends(0);
+    let [top, height] = ends(1);
+    [left, top, width, height]
 }
 
 impl Frame {
@@ -217,8 +265,8 @@ impl Frame {
         }
         let seen = self.camera([viewport.area[2], viewport.area[3]]);
         let camera = &self.scene.data.camera;
-        // Mirrors, the entities that have faces there, and the share of the picture that these reflect.
-        let mut found: Vec<(Place, Vec<usize>, f64)> = Vec::new();
+        let focal_px = 0.5 * f64::from(mirrors.part[1]) / camera.half_height();
+        let mut found: Vec<Candidate> = Vec::new();
         for face in &self.reflectors.faces {
             let placement = &placements[face.entity];
             let corners = face.corners.map(|corner| placement.point(corner));
@@ -230,19 +278,26 @@ impl Frame {
             if height_m < 1e-6 * distance_m {
                 continue;
             }
-            let score =
-                self.reflectance(face.entity, height_m / distance_m) * share_of_picture(seen.clip_from_world, corners);
-            let same = |(place, ..): &&mut (Place, Vec<usize>, f64)| {
-                let Place::Plane(other) = place else { return false };
+            let flat = within(seen.clip_from_world, corners);
+            let reflectance = self.reflectance(face.entity, height_m / distance_m);
+            let candidate = Candidate {
+                place: Place::Plane(plane),
+                entities: vec![face.entity],
+                score: reflectance * share_of_picture(&flat),
+                reflectance,
+                bounds: [
+                    flat.iter().copied().fold(DVec2::INFINITY, DVec2::min),
+                    flat.iter().copied().fold(DVec2::NEG_INFINITY, DVec2::max),
+                ],
+            };
+            let same = |other: &&mut Candidate| {
+                let Place::Plane(other) = other.place else { return false };
                 let off = other.dot(middle.extend(1.0)).abs();
-                (*other - plane).truncate().length() < SAME_PLANE && off < SAME_PLANE * height_m
+                (other - plane).truncate().length() < SAME_PLANE && off < SAME_PLANE * height_m
             };
             match found.iter_mut().find(same) {
-                Some((_, entities, sum)) => {
-                    *sum += score;
-                    entities.push(face.entity);
-                }
-                None => found.push((Place::Plane(plane), vec![face.entity], score)),
+                Some(other) => other.join(candidate),
+                None => found.push(candidate),
             }
         }
         // Parts of small pictures hold no probe.
@@ -256,34 +311,49 @@ impl Frame {
             let (x, y) = toward.any_orthonormal_pair();
             let [x, y] = [x, y].map(|axis| SEEN_RADIUS * radius_m * axis);
             let corners = [centre - x - y, centre + x - y, centre + x + y, centre - x + y];
-            let score = self.reflectance(*entity, 0.5) * share_of_picture(seen.clip_from_world, corners);
-            found.push((Place::Ball(centre, radius_m), vec![*entity], score));
+            let reflectance = self.reflectance(*entity, 0.5);
+            found.push(Candidate {
+                place: Place::Ball(centre, radius_m),
+                entities: vec![*entity],
+                score: reflectance * share_of_picture(&within(seen.clip_from_world, corners)),
+                reflectance,
+                bounds: [-DVec2::ONE, DVec2::ONE],
+            });
         }
-        found.retain(|(.., score)| *score > 0.0);
-        found.sort_by(|(_, _, a), (_, _, b)| b.total_cmp(a));
+        found.retain(|candidate| candidate.score > 0.0);
+        found.sort_by(|a, b| b.score.total_cmp(&a.score));
         // An entity is more than one mirror where each of them is seen well.
         let mut taken = HashSet::new();
-        found.iter_mut().for_each(|(_, entities, score)| {
+        found.iter_mut().for_each(|Candidate { entities, score, .. }| {
             entities.retain(|entity| taken.insert(*entity) || *score > LEAST_SHARE_AGAIN);
         });
-        found.retain(|(_, entities, _)| !entities.is_empty());
+        found.retain(|candidate| !candidate.entities.is_empty());
         // None comes or goes in a step.
-        let least = found.get(mirrors.count()).map_or(0.0, |(.., score)| *score).max(LEAST_SHARE);
-        let shown = found.into_iter().filter(|(.., score)| *score > least).take(mirrors.count());
-        let mirror = |(place, entities, score): (Place, Vec<usize>, f64)| Mirror {
-            shape: match place {
-                Place::Plane(plane) => Shape::Plane(Plane::new(&seen, plane, mirrors.part)),
+        let least = found.get(mirrors.count()).map_or(0.0, |candidate| candidate.score).max(LEAST_SHARE);
+        let shown = found.into_iter().filter(|candidate| candidate.score > least).take(mirrors.count());
+        let mirror = |Candidate { place, entities, score, reflectance, bounds }: Candidate| {
+            let roughness = |entity: &usize| self.scene.entities[*entity].gloss.map_or(0.0, |gloss| gloss.roughness);
+            let alphas = || entities.iter().map(|entity| f64::from(roughness(entity)).powi(2));
+            let least_px = focal_px * alphas().fold(f64::INFINITY, f64::min);
+            let shape = match place {
+                Place::Plane(plane) => {
+                    let rim = mirror::reach(focal_px * alphas().fold(0.0, f64::max));
+                    Shape::Plane(Plane::new(&seen, plane, mirrors.part, texels_within(bounds, mirrors.part, rim)))
+                }
                 Place::Ball(centre, radius_m) => {
                     // As wide as it is seen, and no finer than its blur.
                     let distance_m = centre.distance(seen.eye).max(radius_m);
                     let texels = radius_m / distance_m * f64::from(mirrors.part[1]) / camera.half_height();
-                    let roughness = self.scene.entities[entities[0]].gloss.map_or(0.0, |gloss| gloss.roughness);
-                    let side = mirrors.face_side(texels.min(finest_side(f64::from(roughness))));
+                    let side = mirrors.face_side(texels.min(finest_side(f64::from(roughness(&entities[0])))));
                     Shape::Probe(Box::new(Probe::new(centre, radius_m, side)))
                 }
-            },
-            entities,
-            share: ((score / least - 1.0) / FADE).min(1.0),
+            };
+            Mirror {
+                shape,
+                share: ((score / least - 1.0) / FADE).min(1.0),
+                crisp: least_px < CRISP_PX && reflectance > CRISP_REFLECTANCE,
+                entities,
+            }
         };
         shown.map(mirror).collect()
     }
@@ -325,15 +395,24 @@ impl Frame {
                         entity.emission = Vec3::ZERO;
                     }
                 }
+                let (area, drawn) = match &mirror.shape {
+                    Shape::Plane(plane) => {
+                        let area = mirrors.area(number);
+                        let [left, top, width, height] = plane.read;
+                        (area, [area[0] + left, area[1] + top, width, height])
+                    }
+                    Shape::Probe(probe) => {
+                        let area = mirrors.face_area(number, face, probe.side);
+                        (area, area)
+                    }
+                };
                 DrawnViewport {
-                    area: match &mirror.shape {
-                        Shape::Plane(_) => mirrors.area(number),
-                        Shape::Probe(probe) => mirrors.face_area(number, face, probe.side),
-                    },
+                    area,
+                    drawn,
                     entities,
                     radiosity: self.radiosity.mirrored(self.options.bounces),
                     gloss: None,
-                    pixel: self.pixel_light(),
+                    pixel: self.pixel_light().filter(|_| mirror.crisp),
                     sky: None,
                     lines: 0..0,
                 }
@@ -424,7 +503,7 @@ mod tests {
     #[test]
     fn the_mirrored_camera_sees_what_the_eye_sees_in_the_floor() {
         let seen = seen();
-        let mirror = Plane::new(&seen, DVec4::Y, [64, 64]);
+        let mirror = Plane::new(&seen, DVec4::Y, [64, 64], [0, 0, 64, 64]);
         let through = |p: DVec3| mirror.camera.clip_from_world * p.extend(1.0);
         for point in [DVec3::new(0.2, 0.3, -0.5), DVec3::new(-0.4, 0.8, -3.0), DVec3::new(0.0, 2.0, -40.0)] {
             let clip = through(point);
@@ -466,7 +545,7 @@ mod tests {
             })
         };
         for (half, wanted) in [(0.5, 0.25), (1.0, 1.0), (3.0, 1.0)] {
-            let share = share_of_picture(seen.clip_from_world, across(half));
+            let share = share_of_picture(&within(seen.clip_from_world, across(half)));
             assert!((share - wanted).abs() < 1e-6, "{half}: {share}");
         }
     }

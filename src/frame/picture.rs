@@ -81,6 +81,7 @@ impl Frame {
     pub fn picture_work(&self, placements: &[Placement], white: f32) -> PictureWork<'_> {
         let viewport = |(viewport, lines): &(Viewport, Range<u32>)| DrawnViewport {
             area: viewport.area,
+            drawn: viewport.area,
             entities: self.drawn_in(placements, viewport),
             radiosity: self.radiosity.source(viewport.radiosity),
             gloss: self.drawn_reflections().filter(|_| viewport.shows_light()),

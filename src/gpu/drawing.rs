@@ -174,17 +174,18 @@ impl<'r> Drawing<'_, 'r> {
 
     /// Sets viewport and scissor to a rectangle in pixels: left, top, width and height.
     pub fn area(&mut self, area: [u32; 4]) {
-        self.area_of_texels(area, 1);
+        self.part_of(area, area, 1);
     }
 
-    /// As [`Drawing::area`] for a target each of whose texels is `texel_px` pixels wide.
-    pub fn area_of_texels(&mut self, area: [u32; 4], texel_px: u32) {
+    /// Sets the viewport to an area and the scissor to a part of it, both in pixels, for a target each of whose texels is
+    /// `texel_px` pixels wide.
+    pub fn part_of(&mut self, area: [u32; 4], part: [u32; 4], texel_px: u32) {
         let [x, y, width, height] = area.map(|px| px as f32 / texel_px as f32);
         let viewport = vk::Viewport { x, y, width, height, min_depth: 0.0, max_depth: 1.0 };
         let (handle, buffer) = self.commands.raw();
         // SAFETY: the command buffer is recording.
         unsafe { handle.cmd_set_viewport(buffer, 0, &[viewport]) };
-        let [x, y, width, height] = area;
+        let [x, y, width, height] = part;
         let [left, top] = [x / texel_px, y / texel_px];
         let [right, bottom] = [(x + width).div_ceil(texel_px), (y + height).div_ceil(texel_px)];
         self.clip([left, top, right - left, bottom - top]);

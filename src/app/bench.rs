@@ -132,7 +132,7 @@ fn measure<T: Serialize>(
 }
 
 /// The measurements' view of an open device.
-pub fn bench<'b>(context: &'b Context, global: &Global, quick: bool, progress: &'b dyn Fn(&str)) -> Bench<'b> {
+pub fn bench<'b>(context: &'b Context, global: &Global, quick: bool, progress: &'b (dyn Fn(&str) + Sync)) -> Bench<'b> {
     Bench { baker: &context.baker, cache: &context.cache, progress, quick, seed: global.seed }
 }
 

@@ -4,7 +4,6 @@ use super::Global;
 use crate::error::{Error, Result, is_deceptive, one_line};
 use crate::gpu::compiling;
 use indicatif::{MultiProgress, ProgressBar, ProgressDrawTarget, ProgressStyle};
-use std::cell::RefCell;
 use std::io::{IsTerminal, Write};
 use std::path::Path;
 use std::sync::{Mutex, PoisonError};
@@ -81,12 +80,13 @@ pub fn start_log(global: &Global) {
     let _ = env_logger::Builder::from_env(environment).format(line).try_init();
 }
 
-/// A progress bar for one piece of work after another, and a line where shaders are compiled. Nothing is shown where
+/// A progress bar for each piece of work that is being done, and a line where shaders are compiled. Nothing is shown where
 /// stderr is no terminal or bars are not wanted.
 pub struct Progress {
     hidden: bool,
     bars: MultiProgress,
-    current: RefCell<Option<(String, ProgressBar)>>,
+    /// Those that are not done, and their names.
+    current: Mutex<Vec<(String, ProgressBar)>>,
 }
 
 impl Progress {
@@ -101,7 +101,7 @@ impl Progress {
                 let _ = lines.println(one_line(&line)); // a line that failed is no reason to fail
             });
         }
-        Progress { hidden, bars, current: RefCell::new(None) }
+        Progress { hidden, bars, current: Mutex::default() }
     }
 
     /// Shows that `done` of `all` samples of `what` are baked.
@@ -130,19 +130,19 @@ impl Progress {
         if self.hidden {
             return;
         }
-        let mut current = self.current.borrow_mut();
-        if current.as_ref().is_none_or(|(name, _)| name != what) {
+        let mut current = self.current.lock().unwrap_or_else(PoisonError::into_inner);
+        let known = current.iter().position(|(name, _)| name == what);
+        let number = known.unwrap_or_else(|| {
             let bar = self.bars.add(ProgressBar::new(all.into()));
             let style = ProgressStyle::with_template(template);
             bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()).progress_chars("=> "));
             bar.set_message(one_line(what));
-            *current = Some((what.to_owned(), bar));
-        }
-        if let Some((_, bar)) = current.as_ref() {
-            bar.set_position(done.into());
-            if done == all {
-                bar.finish_and_clear();
-            }
+            current.push((what.to_owned(), bar));
+            current.len() - 1
+        });
+        current[number].1.set_position(done.into());
+        if done == all {
+            current.swap_remove(number).1.finish_and_clear();
         }
     }
 }

@@ -19,8 +19,9 @@ use crate::scene::light::{self, LightMethod, Lights};
 use std::collections::{HashMap, HashSet};
 use std::sync::Arc;
 
-/// A function that is told the name of what is being baked, the samples that are done, and the samples in all.
-pub type SceneProgress<'p> = &'p dyn Fn(&str, u32, u32);
+/// A function that is told the name of what is being baked, the samples that are done, and the samples in all; fields and
+/// surfaces are baked at the same time.
+pub type SceneProgress<'p> = &'p (dyn Fn(&str, u32, u32) + Sync);
 
 #[derive(Clone, Debug, serde::Serialize)]
 pub struct Baked {
@@ -193,7 +194,7 @@ pub fn bakes_transfer(mesh: &Mesh) -> bool {
 }
 
 /// Bakes or finds in the cache every field and transfer of `needs`, which are those of `scene`, mesh by mesh. What is
-/// baked is kept in the cache.
+/// baked is kept in the cache. The device bakes fields while the host casts the rays of surfaces.
 pub fn ensure(
     baker: &Baker,
     cache: &Cache,
@@ -201,6 +202,25 @@ pub fn ensure(
     needs: &SceneNeeds,
     progress: SceneProgress<'_>,
 ) -> Result<BakedScene> {
+    let (fields, surfaces) = std::thread::scope(|threads| {
+        let fields = threads.spawn(|| ensure_fields(baker, cache, scene, needs, progress));
+        let surfaces = ensure_surfaces(cache, scene, needs, progress);
+        (fields.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic)), surfaces)
+    });
+    let (meshes, mut baked) = fields?;
+    baked.extend(surfaces.baked);
+    // What is held for further bakes is free for pictures.
+    baker.rest();
+    Ok(BakedScene { meshes, baked, ..surfaces })
+}
+
+fn ensure_fields(
+    baker: &Baker,
+    cache: &Cache,
+    scene: &Scene,
+    needs: &SceneNeeds,
+    progress: SceneProgress<'_>,
+) -> Result<(Vec<BakedMesh>, Vec<Baked>)> {
     let options = &needs.options;
     let mut baked = Vec::new();
     let mut note = |what: &str, report: Option<BakeReport>| {
@@ -240,6 +260,15 @@ pub fn ensure(
         }
         meshes.push(to);
     }
+    Ok((meshes, baked))
+}
+
+/// The scene without its meshes.
+fn ensure_surfaces(cache: &Cache, scene: &Scene, needs: &SceneNeeds, progress: SceneProgress<'_>) -> BakedScene {
+    let mut baked = Vec::new();
+    let mut note = |what: &str, report: Option<BakeReport>| {
+        baked.extend(report.map(|report| Baked { what: what.to_owned(), report }));
+    };
     let count = scene.entities.len();
     let mut scene_surfaces = Vec::new();
     let mut surface_of = vec![0; count];
@@ -270,7 +299,5 @@ pub fn ensure(
             volume = (!found.blocked.is_empty()).then_some(SceneVolume { volume: found, has });
         }
     }
-    // What is held for further bakes is free for pictures.
-    baker.rest();
-    Ok(BakedScene { meshes, surfaces: scene_surfaces, surface_of, near, rigid, volume, baked })
+    BakedScene { meshes: Vec::new(), surfaces: scene_surfaces, surface_of, near, rigid, volume, baked }
 }

@@ -18,7 +18,7 @@ use crate::field::silhouette::through_box;
 use crate::sh::basis::{MAX_BANDS, MAX_COEFFICIENTS, coefficient_count, values};
 use crate::sh::lobe::clamped_cosine;
 use crate::sh::rotation::Rotation;
-use glam::{DMat3, DQuat, DVec3, Mat3A, Vec3, Vec3A};
+use glam::{DMat3, DQuat, DVec2, DVec3, Mat3A, Vec3, Vec3A};
 use std::f64::consts::{PI, TAU};
 use std::sync::LazyLock;
 
@@ -42,6 +42,8 @@ const CLOSE: f32 = 0.07;
 const AIMED_SIDE: usize = 8;
 /// A target that is nearer than this, in its bounding radii, is met by enough rays of the pattern.
 const AIMED_FROM: f32 = 2.5;
+/// Targets of a point at which rays are aimed: those that send the most light there. Others are left to the pattern.
+const MOST_AIMED: usize = 8;
 
 #[derive(Clone, Copy)]
 pub(super) struct PatternRay {
@@ -142,7 +144,7 @@ fn cells(side: usize) -> impl Iterator<Item = [usize; 2]> {
 /// edge at once. So each is moved within its cell, and along a row, or a column, the moves across it follow the golden
 /// ratio: whatever share of a row an edge cuts off, that share of its rays lies beyond.
 fn ray_of(cell: [usize; 2], side: usize) -> PatternRay {
-    let local = cap(moved(cell, side), 1.0);
+    let local = cap(disc(moved(cell, side)), 1.0);
     PatternRay::new(local, local.z * TAU / (side * side) as f64)
 }
 
@@ -192,24 +194,31 @@ pub(super) fn sphere() -> Vec<PatternRay> {
     directions(2 * FEW_RAYS.len()).map(|toward| PatternRay::new(toward.as_dvec3(), solid_angle)).collect()
 }
 
+/// Places on the unit disc of the rays that are aimed at a target.
+static AIMED: LazyLock<Vec<DVec2>> =
+    LazyLock::new(|| cells(AIMED_SIDE).map(|cell| disc(moved(cell, AIMED_SIDE))).collect());
+
 static MANY_RAYS: LazyLock<Pattern> = LazyLock::new(Pattern::new);
 
-/// A direction about +z, of which 1 - z is at most `height`, for a point of the unit square; equal areas stay equal.
+/// A point of the unit disc for one of the unit square; equal areas stay equal.
 ///
-/// Shirley, Chiu, *A Low Distortion Map Between Disk and Square*, 1997, with the disc lifted to the sphere.
-fn cap([u, v]: [f64; 2], height: f64) -> DVec3 {
+/// Shirley, Chiu, *A Low Distortion Map Between Disk and Square*, 1997.
+fn disc([u, v]: [f64; 2]) -> DVec2 {
     let a = 2.0 * u - 1.0;
     let b = 2.0 * v - 1.0;
-    let (radius, angle) = if a.abs() > b.abs() {
-        (a, PI / 4.0 * b / a)
+    if a.abs() > b.abs() {
+        a * DVec2::from_angle(PI / 4.0 * b / a)
     } else if b != 0.0 {
-        (b, PI / 2.0 - PI / 4.0 * a / b)
+        b * DVec2::from_angle(PI / 2.0 - PI / 4.0 * a / b)
     } else {
-        return DVec3::Z;
-    };
-    let below = radius * radius * height;
-    let flat = radius.signum() * (below * (2.0 - below)).sqrt();
-    DVec3::new(flat * angle.cos(), flat * angle.sin(), 1.0 - below)
+        DVec2::ZERO
+    }
+}
+
+/// The disc lifted to the directions about +z of which 1 - z is at most `height`; equal areas stay equal.
+fn cap(place: DVec2, height: f64) -> DVec3 {
+    let below = place.length_squared() * height;
+    (place * ((2.0 - below) * height).sqrt()).extend(1.0 - below)
 }
 
 /// A point of a surface from which rays leave.
@@ -277,8 +286,8 @@ impl Seen {
 pub struct Counts<'c> {
     /// For each member whether it blocks at all.
     pub blocks: &'c [bool],
-    /// For each member whether the map has its shadows, as only one that blocks may; `None` for no map.
-    pub in_map: Option<&'c [bool]>,
+    /// Members whose shadows the map has, of those that block; `None` for no map.
+    pub in_map: Option<&'c [u32]>,
     pub targets: &'c [Target],
     /// Boxes in the blockers' frame, their least and largest corners, in which something moves that hides what lies beyond.
     pub screens: &'c [[DVec3; 2]],
@@ -291,6 +300,8 @@ pub struct Counts<'c> {
 pub struct Target {
     pub centre: Vec3A,
     pub radius: f32,
+    /// Share of its view that the lamp fills: light on it.
+    pub lit: f32,
 }
 
 impl Target {
@@ -308,14 +319,10 @@ struct Caster<'c> {
 }
 
 impl Caster<'_> {
+    /// What rays meet of the members that block.
     fn cast(&self, locals: &[Vec3A]) -> Vec<Option<BlockerHit>> {
-        self.cast_at(self.counts.blocks, locals)
-    }
-
-    /// What rays meet of the members that count.
-    fn cast_at(&self, counts: &[bool], locals: &[Vec3A]) -> Vec<Option<BlockerHit>> {
         let mut hits = Vec::with_capacity(locals.len());
-        self.blockers.first(self.origin, &self.to_blockers, locals, counts, &mut hits);
+        self.blockers.first(self.origin, &self.to_blockers, locals, self.counts.blocks, &mut hits);
         hits
     }
 
@@ -336,39 +343,48 @@ impl Caster<'_> {
 
     /// Replaces the fronts within targets by those that rays meet which are aimed at them.
     fn aim(&self, fronts: &mut Vec<Front>) {
-        for target in self.counts.targets {
+        let fills = |target: &Target| (target.radius / target.centre.distance(self.origin)).powi(2);
+        let far = self.counts.targets.iter().filter(|target| fills(target) < AIMED_FROM.powi(-2));
+        let mut aimed: Vec<(f32, &Target)> = far.map(|target| (target.lit * fills(target), target)).collect();
+        if aimed.is_empty() {
+            return;
+        }
+        aimed.sort_by(|a, b| b.0.total_cmp(&a.0));
+        aimed.truncate(MOST_AIMED);
+        fronts.retain(|front| !front.apart || aimed.iter().all(|(_, target)| !target.has(front.place)));
+        for (number, (_, target)) in aimed.iter().enumerate() {
             let toward = target.centre - self.origin;
             let away = toward.length();
-            if away < AIMED_FROM * target.radius {
-                continue;
-            }
-            fronts.retain(|front| !target.has(front.place));
             let sine = f64::from(target.radius / away);
             let height = 1.0 - (1.0 - sine * sine).sqrt();
             let to_local = self.to_blockers.transpose() * Mat3A::from(frame((toward / away).as_dvec3()).as_mat3());
-            let ray = |cell| to_local * cap(moved(cell, AIMED_SIDE), height).as_vec3a();
-            let locals: Vec<Vec3A> = cells(AIMED_SIDE).map(ray).filter(|local| local.z > 0.0).collect();
+            let ray = |place: &DVec2| to_local * cap(*place, height).as_vec3a();
+            let locals: Vec<Vec3A> = AIMED.iter().map(ray).filter(|local| local.z > 0.0).collect();
             let solid_angle = TAU * height / (AIMED_SIDE * AIMED_SIDE) as f64;
             let hits = self.cast(&locals);
             let met = locals
                 .iter()
                 .zip(&hits)
                 .filter_map(|(local, hit)| self.front(*local, solid_angle * f64::from(local.z), hit));
-            fronts.extend(met.filter(|front| target.has(front.place)));
+            // What lies in two of them is met by the rays of the first.
+            let is_met = |front: &Front| aimed[..number].iter().any(|(_, other)| other.has(front.place));
+            fronts.extend(met.filter(|front| target.has(front.place) && !is_met(front)));
         }
     }
 
     /// How far each ray comes past all that the map counts; infinity where it is free.
     fn map_distances(&self, locals: &[Vec3A]) -> Vec<f32> {
         let in_map = self.counts.in_map.expect("asked for maps alone");
-        self.cast_at(in_map, locals).iter().map(distance).collect()
+        let mut hits = Vec::with_capacity(locals.len());
+        self.blockers.first_of(self.origin, &self.to_blockers, locals, in_map, &mut hits);
+        hits.iter().map(distance).collect()
     }
 
     /// The same of rays whose first hits are known: only those that meet what the map does not count are cast again.
     fn map_distances_past(&self, locals: &[Vec3A], hits: &[Option<BlockerHit>]) -> Vec<f32> {
         let in_map = self.counts.in_map.expect("asked for maps alone");
         let mut distances: Vec<f32> = hits.iter().map(distance).collect();
-        let is_other = |i: &usize| hits[*i].is_some_and(|hit| !in_map[hit.member as usize]);
+        let is_other = |i: &usize| hits[*i].is_some_and(|hit| !in_map.contains(&hit.member));
         let others: Vec<usize> = (0..hits.len()).filter(is_other).collect();
         let behind = self.map_distances(&others.iter().map(|&i| locals[i]).collect::<Vec<_>>());
         others.iter().zip(behind).for_each(|(&i, distance)| distances[i] = distance);
@@ -627,12 +643,7 @@ mod tests {
         let ball = generate::sphere(1.0, 5);
         let corners = ball.triangles.iter().map(|t| (7, t.map(|i| ball.positions[i as usize] + toward.as_vec3())));
         let eye = Eye { origin: Vec3::ZERO, normal: Vec3::Y };
-        let counts = Counts {
-            blocks: &[true; 8],
-            in_map: with_map.then_some(&[false, false, false, false, false, false, false, true]),
-            targets: &[],
-            screens: &[],
-        };
+        let counts = Counts { blocks: &[true; 8], in_map: with_map.then_some(&[7]), targets: &[], screens: &[] };
         let standing = Standing { rotation: DMat3::IDENTITY, radius: 1.0 };
         see(&Blockers::new(corners.map(triangle), Vec::new(), Vec::new()), &standing, &eye, 4, Rays::Many, counts)
     }
@@ -737,7 +748,7 @@ mod tests {
         let far = square(0.5).map(|t| (1, t));
         let eye = Eye { origin: Vec3::ZERO, normal: Vec3::Y };
         let standing = Standing { rotation: DMat3::IDENTITY, radius: 1.0 };
-        let see_with = |in_map: &[bool], corners: &[(u32, [Vec3; 3])]| {
+        let see_with = |in_map: &[u32], corners: &[(u32, [Vec3; 3])]| {
             let counts = Counts { blocks: &[true; 2], in_map: Some(in_map), targets: &[], screens: &[] };
             see(
                 &Blockers::new(corners.iter().copied().map(triangle), Vec::new(), Vec::new()),
@@ -749,10 +760,10 @@ mod tests {
             )
         };
         // The member that the map leaves out stands in front of the one that it has.
-        let both = see_with(&[true, false], &[&near[..], &far[..]].concat());
+        let both = see_with(&[0], &[&near[..], &far[..]].concat());
         assert!(both.blocked > 0.98, "{}", both.blocked);
-        assert_eq!(both.map, see_with(&[true; 2], &near).map);
-        let free = see_with(&[false; 2], &near);
+        assert_eq!(both.map, see_with(&[0, 1], &near).map);
+        let free = see_with(&[], &near);
         assert!(free.map[..NODES].iter().all(|angle| decode_angle(*angle) > 0.7) && free.blocked > 0.98);
         assert!(free.behind < 0.01 || free.behind > 0.9);
     }

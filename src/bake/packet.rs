@@ -1,5 +1,8 @@
-//! Rays from one point against a hierarchy of triangles, sixteen at a time: what a box or a triangle costs is shared by
-//! all, and vector instructions take eight of them where the processor has AVX2.
+//! Rays from one point against hierarchies of triangles, sixteen at a time: what a box or a triangle costs is shared by
+//! all, and vector instructions take eight of them where the processor has AVX2, or all where it has AVX-512.
+//!
+//! One hierarchy has all triangles, and each member of a group has its own: rays that ask for a few members pass by no
+//! others. Nodes have four children, whose boxes are tested together: a third less time for a ray than with two.
 
 use super::triangles::weights;
 use crate::asset::Mesh;
@@ -15,13 +18,15 @@ const LANES: usize = 16;
 /// How far beyond its sides a triangle reaches, as a share of them: no ray slips between two neighbours.
 const SLACK: f32 = 1e-5;
 const MIXED: u32 = u32::MAX;
+const CHILDREN: usize = 4;
 
 /// Triangles that block, each of one member of a group.
 pub struct Blockers {
-    hierarchy: Bvh2,
-    /// For each node of the hierarchy the member that all of its triangles belong to; [`MIXED`] for those of several.
-    owners: Vec<u32>,
-    /// In the order of the hierarchy's leaves.
+    /// Of the hierarchy of all triangles, which begins with the first, and of those of members.
+    nodes: Vec<Node>,
+    /// For each member the first node of its own hierarchy; `None` where it has no triangles.
+    of_member: Vec<Option<u32>>,
+    /// In the order of the hierarchies' leaves, of one after the other.
     triangles: Vec<Corners>,
     members: Vec<u32>,
     /// Which triangle of the member's mesh each is.
@@ -80,6 +85,36 @@ pub struct BlockerTriangle {
     /// Which triangle of the member's mesh it is.
     pub number: u32,
     pub corners: [Vec3; 3],
+}
+
+#[derive(Clone, Copy)]
+struct Child {
+    low: Vec3A,
+    high: Vec3A,
+    /// A node, or the first of a leaf's triangles.
+    first: u32,
+    /// Triangles of a leaf; 0 for a node.
+    count: u32,
+    /// The member that all of its triangles belong to; [`MIXED`] for those of several.
+    owner: u32,
+}
+
+#[derive(Clone, Copy)]
+struct Node {
+    children: [Child; CHILDREN],
+    /// How many of them there are.
+    count: usize,
+}
+
+/// A child whose box rays enter.
+#[derive(Clone, Copy)]
+struct Entered {
+    node: u32,
+    child: u32,
+    /// How far along the rays it lies.
+    along: f32,
+    /// How many leaves had been met before its box was tested.
+    leaves: u32,
 }
 
 #[derive(Clone, Copy)]
@@ -217,13 +252,22 @@ fn dot<S: Simd>(simd: S, direction: [S::f32s; 3], of: Vec3A) -> S::f32s {
     simd.add_f32s(sum, simd.mul_f32s(direction[2], simd.splat_f32s(of.z)))
 }
 
+/// Which members rays ask for.
+#[derive(Clone, Copy)]
+enum Asked<'c> {
+    /// Those that count, of all.
+    Counted(&'c [bool]),
+    /// A few.
+    Members(&'c [u32]),
+}
+
 /// All packets of one origin, as they are dispatched to what the processor has.
 struct Cast<'c> {
     blockers: &'c Blockers,
     origin: Vec3A,
     turn: &'c Mat3A,
     directions: &'c [Vec3A],
-    counts: &'c [bool],
+    asked: Asked<'c>,
     hits: &'c mut Vec<Option<BlockerHit>>,
 }
 
@@ -232,11 +276,22 @@ impl WithSimd for Cast<'_> {
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) {
-        let Cast { blockers, origin, turn, directions, counts, hits } = self;
+        let Cast { blockers, origin, turn, directions, asked, hits } = self;
         let mut open = Vec::with_capacity(64);
         for rays in directions.chunks(LANES) {
             let mut packet = Packet::new(turn, rays);
-            blockers.traverse(simd, origin, &mut packet, counts, &mut open);
+            match asked {
+                Asked::Counted(counts) if !blockers.nodes.is_empty() => {
+                    blockers.traverse(simd, 0, origin, &mut packet, Some(counts), &mut open);
+                }
+                Asked::Counted(_) => {}
+                Asked::Members(members) => {
+                    let root = |member: &u32| *blockers.of_member.get(*member as usize)?;
+                    for root in members.iter().filter_map(root) {
+                        blockers.traverse(simd, root, origin, &mut packet, None, &mut open);
+                    }
+                }
+            }
             for lane in 0..rays.len() {
                 hits.push(blockers.hit(&packet, lane));
             }
@@ -245,36 +300,95 @@ impl WithSimd for Cast<'_> {
 }
 
 impl Blockers {
-    /// Builds the hierarchy; one of no triangles blocks nothing. `masks` and `backs` are of each member, or empty.
+    /// Builds the hierarchies; those of no triangles block nothing. `masks` and `backs` are of each member, or empty.
     pub fn new(
         triangles: impl IntoIterator<Item = BlockerTriangle>,
         masks: Vec<Option<Mask>>,
         backs: Vec<Option<u32>>,
     ) -> Self {
-        let of: Vec<BlockerTriangle> = triangles.into_iter().collect();
+        let mut all: Vec<BlockerTriangle> = triangles.into_iter().collect();
+        let masks = if masks.iter().any(Option::is_some) { masks } else { Vec::new() };
+        let mut blockers = Blockers {
+            nodes: Vec::new(),
+            of_member: Vec::new(),
+            triangles: Vec::new(),
+            members: Vec::new(),
+            numbers: Vec::new(),
+            masks,
+            backs,
+        };
+        blockers.add(&all);
+        let whole = blockers.nodes.len();
+        all.sort_by_key(|triangle| triangle.member);
+        let members = all.last().map_or(0, |last| last.member as usize + 1);
+        blockers.of_member = vec![None; members];
+        for own in all.chunk_by(|a, b| a.member == b.member) {
+            let member = own[0].member as usize;
+            // That of an only member is the whole.
+            let is_whole = own.len() == all.len() && whole > 0;
+            blockers.of_member[member] = if is_whole { Some(0) } else { blockers.add(own) };
+        }
+        blockers
+    }
+
+    /// Adds a hierarchy of triangles. Returns its first node; `None` without any.
+    fn add(&mut self, of: &[BlockerTriangle]) -> Option<u32> {
+        if of.is_empty() {
+            return None;
+        }
         let triangle = |BlockerTriangle { corners: [a, b, c], .. }: &BlockerTriangle| Triangle {
             v0: (*a).into(),
             v1: (*b).into(),
             v2: (*c).into(),
         };
         let unsorted: Vec<Triangle> = of.iter().map(triangle).collect();
-        let mut hierarchy = build_bvh2_from_tris(&unsorted, BvhBuildParams::slow_build(), &mut Duration::default());
-        hierarchy.reorder_in_stack_traversal_order();
+        let mut binary = build_bvh2_from_tris(&unsorted, BvhBuildParams::slow_build(), &mut Duration::default());
+        binary.reorder_in_stack_traversal_order();
         let corners = |&i: &u32| {
             let Triangle { v0, v1, v2 } = unsorted[i as usize];
             let edges = [v1 - v0, v2 - v0];
             Corners { corner: v0, edges, normal: edges[0].cross(edges[1]) }
         };
-        let members: Vec<u32> = hierarchy.primitive_indices.iter().map(|&i| of[i as usize].member).collect();
-        Blockers {
-            owners: owners(&hierarchy, &members),
-            triangles: hierarchy.primitive_indices.iter().map(corners).collect(),
-            members,
-            numbers: hierarchy.primitive_indices.iter().map(|&i| of[i as usize].number).collect(),
-            backs,
-            masks: if masks.iter().any(Option::is_some) { masks } else { Vec::new() },
-            hierarchy,
+        let first_triangle = self.triangles.len() as u32;
+        self.triangles.extend(binary.primitive_indices.iter().map(corners));
+        self.members.extend(binary.primitive_indices.iter().map(|&i| of[i as usize].member));
+        self.numbers.extend(binary.primitive_indices.iter().map(|&i| of[i as usize].number));
+        let owners = owners(&binary, &self.members[first_triangle as usize..]);
+        Some(self.widen(&binary, &owners, first_triangle, 0))
+    }
+
+    /// Adds a node of a binary hierarchy as one of up to [`CHILDREN`] children: the largest is replaced by its own until
+    /// there are so many. Returns its number.
+    fn widen(&mut self, binary: &Bvh2, owners: &[u32], first_triangle: u32, root: u32) -> u32 {
+        let area = |of: &u32| {
+            let size = binary.nodes[*of as usize].aabb.diagonal();
+            size.x * size.y + size.y * size.z + size.z * size.x
+        };
+        let mut below = vec![root];
+        while below.len() < CHILDREN {
+            let inner = (0..below.len()).filter(|&at| binary.nodes[below[at] as usize].prim_count == 0);
+            let Some(largest) = inner.max_by(|&a, &b| area(&below[a]).total_cmp(&area(&below[b]))) else { break };
+            let first = binary.nodes[below.swap_remove(largest) as usize].first_index;
+            below.extend([first, first + 1]);
         }
+        let number = self.nodes.len();
+        let none = Child { low: Vec3A::ZERO, high: Vec3A::ZERO, first: 0, count: 0, owner: MIXED };
+        self.nodes.push(Node { children: [none; CHILDREN], count: below.len() });
+        for (slot, of) in below.into_iter().enumerate() {
+            let node = &binary.nodes[of as usize];
+            let first = match node.prim_count {
+                0 => self.widen(binary, owners, first_triangle, of),
+                _ => first_triangle + node.first_index,
+            };
+            self.nodes[number].children[slot] = Child {
+                low: node.aabb.min,
+                high: node.aabb.max,
+                first,
+                count: node.prim_count,
+                owner: owners[of as usize],
+            };
+        }
+        number as u32
     }
 
     /// A triangle that has holes, for rays that meet it elsewhere.
@@ -296,7 +410,8 @@ impl Blockers {
         }
     }
 
-    /// The first triangle on each ray of those whose members count. `turn` brings the directions into the triangles' frame.
+    /// Adds the first triangle on each ray of those whose members count. `turn` brings the directions into the triangles'
+    /// frame.
     pub fn first(
         &self,
         origin: Vec3A,
@@ -305,47 +420,77 @@ impl Blockers {
         counts: &[bool],
         hits: &mut Vec<Option<BlockerHit>>,
     ) {
-        hits.clear();
-        Arch::new().dispatch(Cast { blockers: self, origin, turn, directions, counts, hits });
+        Arch::new().dispatch(Cast { blockers: self, origin, turn, directions, asked: Asked::Counted(counts), hits });
     }
 
+    /// Adds the first triangle on each ray of a few members.
+    pub fn first_of(
+        &self,
+        origin: Vec3A,
+        turn: &Mat3A,
+        directions: &[Vec3A],
+        members: &[u32],
+        hits: &mut Vec<Option<BlockerHit>>,
+    ) {
+        Arch::new().dispatch(Cast { blockers: self, origin, turn, directions, asked: Asked::Members(members), hits });
+    }
+
+    /// Meets the triangles below a node; `counts` tells of each member whether it counts, `None` that all do.
     #[inline(always)]
-    fn traverse<S: Simd>(&self, simd: S, origin: Vec3A, packet: &mut Packet, counts: &[bool], open: &mut Vec<u32>) {
-        if self.triangles.is_empty() {
-            return;
-        }
-        let nodes = &self.hierarchy.nodes;
-        open.push(0);
-        while let Some(index) = open.pop() {
-            let owner = self.owners[index as usize];
-            if owner != MIXED && !counts[owner as usize] {
-                continue;
+    fn traverse<S: Simd>(
+        &self,
+        simd: S,
+        root: u32,
+        origin: Vec3A,
+        packet: &mut Packet,
+        counts: Option<&[bool]>,
+        open: &mut Vec<Entered>,
+    ) {
+        let is_left_out = |member: u32| counts.is_some_and(|counts| !counts[member as usize]);
+        let mut leaves = 0;
+        let mut number = root;
+        loop {
+            let node = &self.nodes[number as usize];
+            let first = open.len();
+            for (slot, child) in (0..).zip(&node.children[..node.count]) {
+                if child.owner != MIXED && is_left_out(child.owner) {
+                    continue;
+                }
+                let [low, high] = [child.low - origin, child.high - origin];
+                if packet.enters(simd, low, high) {
+                    let along = (low + high).dot(packet.middle);
+                    open.push(Entered { node: number, child: slot, along, leaves });
+                    // The child that lies nearest along the rays comes last, and is visited first.
+                    let mut at = open.len() - 1;
+                    while at > first && open[at - 1].along < along {
+                        open.swap(at, at - 1);
+                        at -= 1;
+                    }
+                }
             }
-            let node = &nodes[index as usize];
-            if !packet.enters(simd, node.aabb.min - origin, node.aabb.max - origin) {
-                continue;
-            }
-            if node.prim_count > 0 {
-                for triangle in node.first_index..node.first_index + node.prim_count {
-                    let member = self.members[triangle as usize] as usize;
-                    if !counts[member] {
+            // The next node, past leaves.
+            loop {
+                let Some(Entered { node, child, leaves: before, .. }) = open.pop() else { return };
+                let child = &self.nodes[node as usize].children[child as usize];
+                if before != leaves && !packet.enters(simd, child.low - origin, child.high - origin) {
+                    continue;
+                }
+                if child.count == 0 {
+                    number = child.first;
+                    break;
+                }
+                for triangle in child.first..child.first + child.count {
+                    let member = self.members[triangle as usize];
+                    if is_left_out(member) {
                         continue;
                     }
-                    match self.masks.get(member) {
+                    match self.masks.get(member as usize) {
                         Some(Some(mask)) => self.meet_masked(simd, origin, packet, mask, triangle),
                         _ => packet.meet(simd, origin, &self.triangles[triangle as usize], triangle),
                     }
                 }
-                continue;
+                leaves += 1;
             }
-            // The child that lies nearer along the rays comes first.
-            let a = node.first_index;
-            let b = a + 1;
-            let aabbs = [&nodes[a as usize].aabb, &nodes[b as usize].aabb];
-            let apart = aabbs[1].min + aabbs[1].max - aabbs[0].min - aabbs[0].max;
-            let nearer_first = apart.dot(packet.middle) > 0.0;
-            open.push(if nearer_first { b } else { a });
-            open.push(if nearer_first { a } else { b });
         }
     }
 
@@ -425,7 +570,15 @@ mod tests {
             let origin = 1.5 * random_direction(&mut rng).as_vec3a();
             let directions: Vec<Vec3A> = (0..37).map(|_| random_direction(&mut rng).as_vec3a()).collect();
             for only_second in [false, true] {
+                hits.clear();
                 blockers.first(origin, &Mat3A::IDENTITY, &directions, &[!only_second, true], &mut hits);
+                let of = if only_second { &[1][..] } else { &[1, 0] };
+                let mut of_members = Vec::new();
+                blockers.first_of(origin, &Mat3A::IDENTITY, &directions, of, &mut of_members);
+                let distances = |hits: &[Option<BlockerHit>]| -> Vec<Option<f32>> {
+                    hits.iter().map(|hit| hit.map(|hit| hit.distance)).collect()
+                };
+                assert_eq!(distances(&hits), distances(&of_members));
                 assert_eq!(hits.len(), directions.len());
                 for (direction, hit) in directions.iter().zip(&hits) {
                     let counted = corners.iter().enumerate().filter(|(i, _)| !only_second || member_of(*i as u32) == 1);
@@ -447,6 +600,7 @@ mod tests {
             }
         }
         assert!((300..3300).contains(&met), "{met}");
+        hits.clear();
         Blockers::new([], Vec::new(), Vec::new()).first(Vec3A::ZERO, &Mat3A::IDENTITY, &[Vec3A::X], &[], &mut hits);
         assert_eq!(hits, [None]);
     }
@@ -471,6 +625,7 @@ mod tests {
         );
         let mut hits = Vec::new();
         for (x, distance) in [(0.3, 1.0), (0.7, 3.0)] {
+            hits.clear();
             blockers.first(Vec3A::new(x, 0.5, 0.0), &Mat3A::IDENTITY, &[Vec3A::Z], &[true; 3], &mut hits);
             assert!((hits[0].unwrap().distance - distance).abs() < 1e-5, "{x}: {hits:?}");
         }

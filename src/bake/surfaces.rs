@@ -30,7 +30,7 @@ use std::sync::{Arc, OnceLock};
 use std::time::Instant;
 
 /// Counts in every name of the cache: another number where a bake of surfaces computes something else.
-const VERSION: u32 = 36;
+const VERSION: u32 = 37;
 /// How far towards the middle of its triangles a vertex is seen from, as a share of the way: the light of a crease is
 /// that just inside each face. Where meshes are left as they are, so are the places from which they are seen.
 const NUDGE: f32 = 0.02;
@@ -531,15 +531,18 @@ impl<'p> Group<'p> {
 /// members.
 fn targets(members: &[Member], spheres: &[(DVec3, f64)]) -> Vec<Target> {
     let lamps = || members.iter().zip(spheres).filter(|(member, _)| member.emits).map(|(_, sphere)| sphere);
-    let is_lit = |(centre, radius): &(DVec3, f64)| {
-        let lights =
-            |(lamp, size): &(DVec3, f64)| lamp.distance(*centre) < LIT_CLOSE * radius && *radius < LIT_RADII * size;
-        *radius < LIT_SHARE && lamps().any(lights)
+    let lit = |(centre, radius): &(DVec3, f64)| {
+        let is_close = |(lamp, size): &&(DVec3, f64)| {
+            lamp.distance(*centre) < LIT_CLOSE * radius && *radius < LIT_RADII * size && *radius < LIT_SHARE
+        };
+        let fills = |(lamp, size): &(DVec3, f64)| (size / lamp.distance(*centre).max(*size)).powi(2);
+        lamps().filter(is_close).map(fills).reduce(f64::max)
     };
-    let lit = members.iter().zip(spheres).filter(|(member, sphere)| member.receives && !member.emits && is_lit(sphere));
-    let target =
-        |(_, (centre, radius)): (_, &(DVec3, f64))| Target { centre: centre.as_vec3a(), radius: 1.01 * *radius as f32 };
-    let mut targets: Vec<Target> = lit.map(target).collect();
+    let target = |(member, sphere): (&Member, &(DVec3, f64))| {
+        let lit = lit(sphere).filter(|_| member.receives && !member.emits)?;
+        Some(Target { centre: sphere.0.as_vec3a(), radius: 1.01 * sphere.1 as f32, lit: lit as f32 })
+    };
+    let mut targets: Vec<Target> = members.iter().zip(spheres).filter_map(target).collect();
     targets.sort_by(|a, b| b.radius.total_cmp(&a.radius));
     targets
 }
@@ -597,7 +600,7 @@ impl GroupSpace<'_> {
         self.see_with(position, normal, nudge, rays, None)
     }
 
-    fn see_with(&self, position: Vec3, normal: Vec3, nudge: Vec3, rays: Rays, in_map: Option<&[bool]>) -> Seen {
+    fn see_with(&self, position: Vec3, normal: Vec3, nudge: Vec3, rays: Rays, in_map: Option<&[u32]>) -> Seen {
         let group = self.group;
         let eye = Eye { origin: self.placed(position + nudge).into(), normal };
         let standing = &group.standings[self.member];
@@ -678,14 +681,13 @@ impl GroupSpace<'_> {
             mesh.positions.iter().zip(nudges).step_by(step).map(|(p, nudge)| self.placed(*p + *nudge)).collect();
         let is_around = |member: usize| {
             let (middle, reach) = group.spheres[member];
-            let mut counts = vec![false; self.blocks.len()];
-            counts[member] = self.others[member];
             let is_beside = |origin: &Vec3A| origin.as_dvec3().distance(middle) > reach;
-            if !counts[member] || self.keeps_outline(member) || origins.iter().any(is_beside) {
+            if !self.others[member] || self.keeps_outline(member) || origins.iter().any(is_beside) {
                 return false;
             }
             let mut hits = Vec::with_capacity(origins.len() * toward.len());
-            origins.iter().for_each(|o| group.blockers.first(*o, &Mat3A::IDENTITY, &toward, &counts, &mut hits));
+            let of = [member as u32];
+            origins.iter().for_each(|o| group.blockers.first_of(*o, &Mat3A::IDENTITY, &toward, &of, &mut hits));
             hits.iter().flatten().count() as f64 > AROUND * hits.len() as f64
         };
         (0..self.blocks.len()).into_par_iter().map(is_around).collect()
@@ -747,8 +749,8 @@ impl GroupSpace<'_> {
             let look = |cluster: &&[u32]| {
                 let places = cluster.iter().map(|&v| mesh.positions[v as usize]);
                 let near = if has_maps { self.near(places, &members_around) } else { Vec::new() };
-                let mut in_map = vec![false; self.blocks.len()];
-                near.iter().for_each(|&member| in_map[member as usize] = self.blocks[member as usize]);
+                let blocks = |member: &u32| self.blocks[*member as usize];
+                let in_map: Vec<u32> = near.iter().copied().filter(blocks).collect();
                 let vertex = |&v: &u32| {
                     let v = v as usize;
                     let normal = mesh.normals[v];

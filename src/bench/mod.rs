@@ -33,7 +33,7 @@ pub struct Bench<'b> {
     /// Cache of baked fields and transfers.
     pub cache: &'b Cache,
     /// Receives descriptions of the current work.
-    pub progress: &'b dyn Fn(&str),
+    pub progress: &'b (dyn Fn(&str) + Sync),
     /// Whether to run a reduced measurement that ends within a minute on two cores.
     pub quick: bool,
     /// Seed of vertices and rays.

@@ -5,7 +5,7 @@ use super::reflect::Reflection;
 use crate::error::{Error, Result};
 use std::collections::BTreeMap;
 use std::path::Path;
-use std::sync::OnceLock;
+use std::sync::{Mutex, OnceLock, PoisonError};
 
 /// Pipeline stage of a shader, given by the file ending of its entry point.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -52,10 +52,15 @@ pub struct Shader {
 
 impl Shader {
     /// Compiles `source`, or reads the words from `cache_dir` if the same source, includes and defines were compiled by
-    /// the same compiler before.
+    /// the same compiler before. What this process has compiled it keeps: one bake after another asks for the same.
     pub fn compile(source: &ShaderSource<'_>, cache_dir: Option<&Path>) -> Result<Self> {
+        static COMPILED: Mutex<BTreeMap<String, Shader>> = Mutex::new(BTreeMap::new());
+        let compiled = || COMPILED.lock().unwrap_or_else(PoisonError::into_inner);
         let includes = gather(source.name, &source.text, source.include)?;
         let key = key(source, &includes);
+        if let Some(shader) = compiled().get(&key) {
+            return Ok(shader.clone());
+        }
         let path = cache_dir.map(|folder| folder.join("spirv").join(format!("{key}.spv")));
         let file = path.as_ref().and_then(|path| crate::files::read(path).ok()).unwrap_or_default();
         let cached = unsealed(&key, &file).filter(|bytes| bytes.len() % 4 == 0);
@@ -76,7 +81,9 @@ impl Shader {
         {
             log::warn!("{}: the compiled shader was not saved: {error}", path.display());
         }
-        shader(spirv)
+        let shader = shader(spirv)?;
+        compiled().insert(key, shader.clone());
+        Ok(shader)
     }
 }
 

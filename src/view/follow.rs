@@ -16,6 +16,7 @@ use crate::scene::motion::RotationData;
 use crate::scene::{EntityData, Placement, Scene};
 use crate::scene_buffers::limits;
 use glam::Vec3;
+use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
 /// Towards the light that shapes are seen by.
@@ -130,11 +131,13 @@ impl Viewer {
             let device = Device::new(&options)?;
             let baker = Baker::new(&device, &library);
             limits::check(&device, &needs)?;
+            let done = Mutex::new(vec![0; missing.len()]);
             let told = |what: &str, now: u32, of: u32| {
                 let Some(place) = missing.iter().position(|(name, _)| name == what) else { return };
-                let before: u32 = missing[..place].iter().map(|(_, captures)| captures).sum();
                 let share = f64::from(now) / f64::from(of.max(1));
-                worker.report("shadows", before + (share * f64::from(missing[place].1)) as u32, all);
+                let mut done = done.lock().unwrap_or_else(PoisonError::into_inner);
+                done[place] = (share * f64::from(missing[place].1)) as u32;
+                worker.report("shadows", done.iter().sum(), all);
             };
             // Coarse surfaces are not counted: a second or two.
             bake::ensure(&baker, &cache, &still, &coarse, &|_, _, _| worker.report("shadows", 0, all))?;

@@ -4,12 +4,13 @@
 use super::pixels::Eye;
 use super::raycast::RayCast;
 use super::{Vertex, World};
+use crate::bounce::Bounces;
 use crate::scene::Scene;
 
 /// Pixels along the longer side of the picture that is metered.
-const SIZE_PX: f64 = 64.0;
-/// Rays a pixel and light.
-const RAYS: u32 = 32;
+const SIZE_PX: f64 = 48.0;
+/// Rays a pixel and light; each is followed as it bounces, as most of the light in a room does.
+const RAYS: u32 = 8;
 /// Share of the pixels that are darker than the one that is shown nearly white.
 const BRIGHT: f64 = 0.92;
 /// Value that it gets, linear.
@@ -46,7 +47,7 @@ pub fn exposure_ev(scene: &Scene, time_s: f64, aspect: f64) -> Option<f32> {
     let receiving = seen.iter().filter(|(_, seen)| scene.entities[seen.entity].receives);
     let points: Vec<_> =
         receiving.map(|(pixel, seen)| (Vertex { entity: seen.entity, index: *pixel as usize }, seen.view)).collect();
-    let cast = RayCast { rays: RAYS, runs: 1, ..RayCast::default() };
+    let cast = RayCast { rays: RAYS, runs: 1, bounces: Bounces::All.most(), ..RayCast::default() };
     let lit = cast.run_at(&world, &points);
     let brightest = |rgb: [f64; 3]| rgb.into_iter().fold(0.0, f64::max);
     let found = of_values(lit.iter().map(|estimate| brightest(estimate.radiosity)).collect())

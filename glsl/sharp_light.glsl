@@ -451,37 +451,43 @@ bool has_outline(uint packed) {
 }
 
 // Whether the ball of an entry's occluder reaches into the cone around all parts of its chain's light, as far as the
-// light.
-bool may_block(uint packed, Surface surface) {
+// light. `radius`: of the light's bounding sphere, metres.
+bool may_block(uint packed, Surface surface, SeenLight light, float radius) {
 #if BLENDS
     if ((near_occluders & occluder_bit(packed & SKY_CHAIN)) == 0) {
         return false;
     }
 #endif
-    vec4 shining = ENTITY(chain_light(packed)).centre, ball = ENTITY(packed & SKY_CHAIN).centre;
-    vec3 from = surface.origin + surface.position;
-    vec3 to_light = shining.xyz - from, to_ball = ball.xyz - from;
-    float distance = length(to_light);
-    vec3 toward = to_light / max(distance, 1e-30);
-    float sine = min(CONE_WIDER / max(shining.w * distance, 1e-30), MOST_SINE);
-    float radius = BALL_WIDER / ball.w;
+    vec4 ball = ENTITY(packed & SKY_CHAIN).centre;
+    vec3 to_ball = ball.xyz - surface.origin - surface.position;
+    float sine = min(CONE_WIDER * light.sine, MOST_SINE);
+    float reach = BALL_WIDER / ball.w;
 #if EDGES
-    radius += max(1.0, EDGE_REACH) * surface.step;
+    reach += max(1.0, EDGE_REACH) * surface.step;
 #endif
-    float along = dot(to_ball, toward);
-    float off = length(to_ball - along * toward);
-    return along > -radius && along - radius < distance + 1.0 / shining.w
-        && off * sqrt(1.0 - sine * sine) - max(along, 0.0) * sine < radius;
+    float along = dot(to_ball, light.toward);
+    float off = length(to_ball - along * light.toward);
+    bool meets = along > -reach && along - reach < light.distance + radius
+              && off * sqrt(1.0 - sine * sine) - max(along, 0.0) * sine < reach;
+#if PANELS
+    // Rays to a strip stay near the plane through its length, however wide the cone is.
+    vec2 side = vec2(-light.half_edges[0].z, light.half_edges[0].y);
+    side /= max(length(side), 1e-30);
+    float wide = abs(dot(light.half_edges[1].yz, side)) + sqrt(light.area * (0.25 / PI));
+    float aside = abs(dot(vec2(dot(to_ball, light.across), dot(to_ball, light.down)), side));
+    meets = meets && (!is_rectangle(light) || aside < reach + CONE_WIDER * wide);
+#endif
+    return meets;
 }
 
 // The first entry of a chain from `i` on that has to be evaluated: an occluder that may block, or the light.
 // Values of this loop are read again behind it: on lavapipe a lane that leaves a loop early may lose what the loop does
 // not carry.
-uint next_entry(Surface surface, uint i) {
+uint next_entry(Surface surface, SeenLight light, float radius, uint i) {
     bool passes = false;
     do {
         uint packed = entry_at(i);
-        passes = (packed & ENTRY_LIGHT) == 0 && !may_block(packed, surface);
+        passes = (packed & ENTRY_LIGHT) == 0 && !may_block(packed, surface, light, radius);
         i += passes ? 1 : 0;
     } while (passes);
     return i;
@@ -499,6 +505,7 @@ vec3 chain_sum(Surface surface, uint i, uint end) {
         light.box[1] = node_quad(own + 1).xyz / shining.centre.w;
     }
 #endif
+    float radius = 1.0 / shining.centre.w;
     uint first_block = light.fine >= 1.0 ? 1 : 0, last_block = light.fine <= 0.0 ? 0 : 4;
     vec4 shares[BLOCKS]; // irradiance by the parts of each block
 #if SHOWN || PANELS
@@ -521,7 +528,7 @@ vec3 chain_sum(Surface surface, uint i, uint end) {
         b++;
     } while (b <= last_block);
     float shines = shining.light_kind == LIGHT_BALL ? shining.light_size : 1.0;
-    i = next_entry(surface, i);
+    i = next_entry(surface, light, radius, i);
     uint packed = entry_at(i);
     b = first_block;
     do {
@@ -536,7 +543,7 @@ vec3 chain_sum(Surface surface, uint i, uint end) {
 #endif
             bool last = b == last_block;
             b = last ? first_block : b + 1;
-            i = last ? next_entry(surface, i + 1) : i;
+            i = last ? next_entry(surface, light, radius, i + 1) : i;
             packed = entry_at(i);
         }
     } while (has_outline(packed));
@@ -554,7 +561,7 @@ vec3 chain_sum(Surface surface, uint i, uint end) {
 #if KEEPS
             near_occluders |= occluder_bit(packed & SKY_CHAIN);
 #endif
-            i = next_entry(surface, i + 1);
+            i = next_entry(surface, light, radius, i + 1);
             packed = entry_at(i);
             if (!is_kind(packed, ENTRY_SHEET)) {
                 set_block(shares, b, shadow.free * of_block(shares, b));
@@ -583,7 +590,7 @@ vec3 chain_sum(Surface surface, uint i, uint end) {
 #endif
             bool last = b == last_block;
             b = last ? first_block : b + 1;
-            i = last ? next_entry(surface, i + 1) : i;
+            i = last ? next_entry(surface, light, radius, i + 1) : i;
             packed = entry_at(i);
         }
     } while (is_kind(packed, ENTRY_CUBOID));
@@ -595,7 +602,7 @@ vec3 chain_sum(Surface surface, uint i, uint end) {
 #if KEEPS
             near_occluders |= occluder_bit(packed & SKY_CHAIN);
 #endif
-            i = next_entry(surface, i + 1);
+            i = next_entry(surface, light, radius, i + 1);
             packed = entry_at(i);
         }
     } while (is_kind(packed, ENTRY_GLOBE));
@@ -651,6 +658,11 @@ vec3 chain_sum(Surface surface, uint i, uint end) {
     find_rim(ramp, shining, surface.step / max(light.distance, 1e-30));
     float miss = add_open(unblocked, cone, shining);
 #endif
+#if HIDES
+    // Pixels around the vertex may still see some of that sun.
+    bool is_hidden = (hidden_suns & shining.hidden_bit) != 0;
+    cone = is_hidden ? 0.0 : cone;
+#endif
 #if SHOWN
     note_share(chain_light(entry_at(end)), irradiance * cone);
 #endif
@@ -658,7 +670,7 @@ vec3 chain_sum(Surface surface, uint i, uint end) {
     irradiance *= over_parts(surface, light);
 #endif
 #if KEEPS
-    bool dark = passed <= 0.001 * unblocked && unblocked > 0.0;
+    bool dark = is_hidden || (passed <= 0.001 * unblocked && unblocked > 0.0);
     keep(shining, dark ? 0.0 : max(irradiance * cone, LEAST_KEPT), miss);
 #endif
 #if LAMPS

@@ -111,8 +111,10 @@ shared_struct! {
         irradiance_first: u32,
         /// Of a tube: its thickness over its width, 1 of a round one; see [`crate::field::sub_light::LampFace::Tube`].
         light_thin: f32,
+        /// Of a sun: its bit among those that a vertex tells hidden; 0 of any other light.
+        hidden_bit: u32,
         /// Texels hold a multiple of four words.
-        unused_pair: [f32; 2],
+        unused: f32,
     }
 }
 

@@ -252,6 +252,8 @@ pub struct Seen {
     pub buried: bool,
     /// Fronts that the rays met, of [`Rays::Many`] alone.
     pub fronts: Vec<Front>,
+    /// A bit for each of the group's suns that nothing of it can be seen of, of [`Rays::Many`] alone.
+    pub hidden_suns: u32,
 }
 
 #[derive(Clone, Copy, Debug)]

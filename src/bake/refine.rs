@@ -6,7 +6,7 @@
 //! Generalized Bisection of Simplices*, 1984). Both sides of an edge are split together: there are no T-junctions.
 
 use super::own_visibility::{Rays, Seen};
-use super::surfaces::GroupSpace;
+use super::surfaces::{GroupSpace, triangles_around};
 use crate::asset::Mesh;
 use crate::asset::mesh::Attributes;
 use glam::{DVec3, Vec3};
@@ -40,6 +40,8 @@ const WITHIN: [[f32; 3]; 10] = [
     [0.02, 0.33, 0.65],
     [0.34, 0.33, 0.33],
 ];
+/// Where triangles around a vertex are held to be on one side, on the way to their middles.
+const PARTED: f32 = 0.1;
 /// Share of the vertices by which a round may grow a group, so that the worst edges are split first.
 const GROWTH: f64 = 0.35;
 
@@ -92,6 +94,52 @@ impl Refined {
         let key = (position + Vec3::ZERO).to_array().map(f32::to_bits);
         self.places.push(*self.place_of.entry(key).or_insert(next));
         self.positions.push(position);
+    }
+
+    /// Gives every vertex of a plane that something divides, as a roof does the wall above it from that below, a copy for
+    /// each side.
+    pub fn part(&mut self, space: &GroupSpace<'_>) {
+        let around = triangles_around(self.positions.len(), &self.triangles);
+        let nudges = space.nudges(&self.positions, &self.normals, &self.triangles);
+        // For each vertex the triangles of every side.
+        let sides = |v: usize| -> Vec<Vec<u32>> {
+            let normal = self.normals[v];
+            let corners = |of: u32| self.triangles[of as usize].map(|corner| self.positions[corner as usize]);
+            let is_flat = |of: &u32| {
+                let [a, b, c] = corners(*of);
+                (b - a).cross(c - a).normalize_or_zero().dot(normal) > FLAT
+            };
+            let mut sides: Vec<Vec<u32>> = Vec::new();
+            if !around[v].iter().all(is_flat) {
+                return sides;
+            }
+            let inside = |of: u32| {
+                let middle = corners(of).iter().sum::<Vec3>() / 3.0;
+                self.positions[v].lerp(middle, PARTED) + nudges[v].dot(normal) * normal
+            };
+            for &of in &around[v] {
+                let is_beside = |side: &&mut Vec<u32>| !space.is_between(inside(side[0]), inside(of));
+                match sides.iter_mut().find(is_beside) {
+                    Some(side) => side.push(of),
+                    None => sides.push(vec![of]),
+                }
+            }
+            sides
+        };
+        let sides: Vec<Vec<Vec<u32>>> = (0..self.positions.len()).into_par_iter().map(sides).collect();
+        for (v, sides) in sides.into_iter().enumerate() {
+            for side in sides.into_iter().skip(1) {
+                let copy = self.positions.len() as u32;
+                self.add_position(self.positions[v]);
+                self.normals.push(self.normals[v]);
+                self.attributes.add_middle(v, v);
+                self.transfers.push(None);
+                for of in side {
+                    let corners = self.triangles[of as usize].iter_mut();
+                    corners.filter(|corner| **corner as usize == v).for_each(|corner| *corner = copy);
+                }
+            }
+        }
     }
 
     /// The finished mesh, of the shape and name of `mesh`.
@@ -310,6 +358,7 @@ pub(super) fn refine(
     }
     let share = (limits.vertices - start) / 2;
     for (refined, space, flat) in surfaces.iter_mut() {
+        refined.part(space);
         let most = if *flat { limits.flat_edge } else { limits.edge };
         let budget = refined.positions.len() + share;
         refined.cut_longest(most / space.scale(), budget);

@@ -30,7 +30,7 @@ use std::sync::{Arc, OnceLock};
 use std::time::Instant;
 
 /// Counts in every name of the cache: another number where a bake of surfaces computes something else.
-const VERSION: u32 = 37;
+const VERSION: u32 = 39;
 /// How far towards the middle of its triangles a vertex is seen from, as a share of the way: the light of a crease is
 /// that just inside each face. Where meshes are left as they are, so are the places from which they are seen.
 const NUDGE: f32 = 0.02;
@@ -48,8 +48,12 @@ const WITHIN: f64 = 0.02;
 /// around it, wherever its middle is. So many vertices look, each in so many directions.
 const AROUND: f64 = 0.6;
 const LOOKS: [usize; 2] = [16, 64];
-/// Angular radius below which the shadows of a sun have edges that surfaces follow: 3 degrees.
+/// Angular radius below which the shadows of a sun have edges that surfaces follow: 3 degrees; and the most such suns, for
+/// each of which a vertex has a bit in a float.
 const CRISP_RAD: f64 = 0.05;
+const MOST_SUNS: usize = 24;
+/// Where rays to a sun leave its middle, in its angular radii, along two axes.
+const SUN_RAYS: [[f64; 2]; 5] = [[0.0, 0.0], [0.8, 0.0], [0.0, 0.8], [-0.8, 0.0], [0.0, -0.8]];
 /// Of the vertices to which surfaces may grow one in so many is added at least, however many there were: a floor below a
 /// fine statue is lit at four of its own.
 const LEAST_ADDED: usize = 4;
@@ -101,9 +105,9 @@ pub struct GroupPlan {
     bands: usize,
     /// Vertices to which all surfaces of the scene may grow, and whether anything moves in it.
     refinement: Option<(u32, bool)>,
-    /// Unit directions of suns whose shadows have edges, world. Surfaces are finer there, for what light bounces off them,
-    /// but serve other suns as well.
-    suns: Vec<DVec3>,
+    /// Suns whose shadows have edges, of a group at rest. Surfaces are finer there, for what light bounces off them, and
+    /// tell which are hidden, but serve other suns as well.
+    suns: Vec<CrispSun>,
     /// Name in the cache; `None` where nothing has to be baked.
     pub key: Option<String>,
     /// The same for all suns.
@@ -112,6 +116,14 @@ pub struct GroupPlan {
     screens: Vec<Option<[DVec3; 2]>>,
     /// What it blocks where other things move.
     pub volume: Option<VolumePlan>,
+}
+
+/// A sun whose shadows have edges.
+#[derive(Clone, Copy, Debug)]
+pub struct CrispSun {
+    /// Unit direction, world.
+    pub toward: DVec3,
+    half_angle_rad: f64,
 }
 
 /// A surface with its own visibility.
@@ -126,6 +138,8 @@ pub struct BakedSurface {
     pub near: Vec<Vec<u32>>,
     /// What every vertex sees of its group's fronts, in the order of clusters; `None` where none sees any.
     pub links: Option<Arc<Links>>,
+    /// In the mesh's order of vertices a bit for each of the group's suns that is hidden; `None` where none is.
+    pub hidden_suns: Option<Arc<Vec<u32>>>,
 }
 
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -141,7 +155,14 @@ pub struct Links {
 impl BakedSurface {
     /// A mesh as it is, which sees nothing of itself.
     pub fn plain(mesh: &Arc<Mesh>) -> Self {
-        BakedSurface { mesh: mesh.clone(), transfer: None, self_visibility: None, near: Vec::new(), links: None }
+        BakedSurface {
+            mesh: mesh.clone(),
+            transfer: None,
+            self_visibility: None,
+            near: Vec::new(),
+            links: None,
+            hidden_suns: None,
+        }
     }
 }
 
@@ -176,8 +197,11 @@ impl SurfacePlan {
             }
         };
         let screens: Vec<_> = scene.screens().into_iter().map(|entity| scene.reach(entity)).collect();
-        let is_crisp = |sun: &Disc| sun.half_angle_rad < CRISP_RAD;
-        let suns: Vec<DVec3> = scene.environment.discs().into_iter().filter(is_crisp).map(|sun| sun.toward).collect();
+        let crisp = |sun: Disc| {
+            let Disc { toward, half_angle_rad, .. } = sun;
+            (half_angle_rad < CRISP_RAD).then_some(CrispSun { toward, half_angle_rad })
+        };
+        let suns: Vec<CrispSun> = scene.environment.discs().into_iter().filter_map(crisp).take(MOST_SUNS).collect();
         let mut plans: Vec<GroupPlan> = Vec::new();
         // The plans of entities alone: those with equal meshes share what is baked.
         let mut alone: HashMap<([u8; 32], [bool; 4], Option<*const Texture>), usize> = HashMap::new();
@@ -198,9 +222,9 @@ impl SurfacePlan {
                 entities.iter().map(|&entity| member(entity, scene.data.entities[entity].fixed())).collect()
             };
             let bands = options.bands;
-            let among_screens = members.len() > 1 && scene.is_at_rest(entities[0]);
-            let screens = if among_screens { screens.clone() } else { Vec::new() };
-            let suns = if members.len() > 1 { suns.clone() } else { Vec::new() };
+            let is_resting_group = members.len() > 1 && scene.is_at_rest(entities[0]);
+            let screens = if is_resting_group { screens.clone() } else { Vec::new() };
+            let suns = if is_resting_group { suns.clone() } else { Vec::new() };
             let plan = GroupPlan {
                 entities,
                 members,
@@ -222,6 +246,12 @@ impl SurfacePlan {
             plans.push(GroupPlan { volume, ..plan });
         }
         SurfacePlan { groups: plans }
+    }
+
+    /// Unit directions of the suns of which surfaces tell whether they are hidden, in the order of their bits.
+    pub fn suns(&self) -> Vec<DVec3> {
+        let suns = self.groups.iter().map(|group| &group.suns).find(|suns| !suns.is_empty());
+        suns.into_iter().flatten().map(|sun| sun.toward).collect()
     }
 
     /// Names of all that is baked, whatever the suns: another scene with these names can do with the same surfaces.
@@ -375,7 +405,8 @@ impl GroupPlan {
         let start = refined.iter().map(|(refined, ..)| refined.positions.len()).sum();
         if let Some(limits) = self.limits(&group, start).filter(|_| !refined.is_empty()) {
             let most = limits.vertices.max(1) as u32;
-            refine(&mut refined, &self.suns, &limits, &|count| progress((count as u32).min(most) / 2, most));
+            let suns: Vec<DVec3> = self.suns.iter().map(|sun| sun.toward).collect();
+            refine(&mut refined, &suns, &limits, &|count| progress((count as u32).min(most) / 2, most));
         }
         let mut surfaces = self.plain();
         let mut parents: Vec<Option<Vec<u32>>> = vec![None; surfaces.len()];
@@ -610,6 +641,9 @@ impl GroupSpace<'_> {
         if is_covered {
             seen.cover();
         }
+        if rays == Rays::Many {
+            seen.hidden_suns = self.hidden_suns(position + nudge, normal);
+        }
         let sees_backs = seen.blocked > BURIED_BLOCKED && seen.behind > BURIED_BACKS * seen.blocked;
         seen.buried = group.plan.refinement.is_some() && (is_covered || sees_backs);
         seen
@@ -634,6 +668,25 @@ impl GroupSpace<'_> {
     /// A point of the member's frame in the group's.
     fn placed(&self, point: Vec3) -> Vec3A {
         self.group.place(self.own().placement.point(point.as_dvec3()))
+    }
+
+    /// A bit for each of the group's suns of which a point that faces it sees nothing. Outlines of what surrounds a point,
+    /// as those of a house, tell this badly near its walls.
+    fn hidden_suns(&self, point: Vec3, normal: Vec3) -> u32 {
+        let origin = self.placed(point);
+        let mut hits = Vec::with_capacity(SUN_RAYS.len());
+        let mut hidden = 0;
+        for (number, sun) in self.group.plan.suns.iter().enumerate() {
+            if normal.dot(self.local(sun.toward)) <= 0.0 {
+                continue;
+            }
+            let (x, y) = sun.toward.any_orthonormal_pair();
+            let ray = |[a, b]: [f64; 2]| (sun.toward + sun.half_angle_rad * (a * x + b * y)).normalize().as_vec3a();
+            hits.clear();
+            self.group.blockers.first(origin, &Mat3A::IDENTITY, &SUN_RAYS.map(ray), &self.blocks, &mut hits);
+            hidden |= u32::from(hits.iter().all(Option::is_some)) << number;
+        }
+        hidden
     }
 
     /// Whether the way from a point of the member's frame towards a sun is free.
@@ -740,6 +793,7 @@ impl GroupSpace<'_> {
         let has_maps = wanted.self_visibility && (members_around.contains(&true) || !is_grid());
         let mut maps = vec![0; if has_maps { mesh.positions.len() * BYTES } else { 0 }];
         let mut near = Vec::with_capacity(order.len().div_ceil(CLUSTER_VERTICES as usize));
+        let mut hidden_suns = vec![0; mesh.positions.len()];
         let mut any_blocked = false;
         let mut any_in_map = false;
         let mut linked = Links::default();
@@ -766,10 +820,14 @@ impl GroupSpace<'_> {
                         let corners = mesh.triangles[triangle as usize].iter();
                         corners.map(|&v| mesh.positions[v as usize]).sum::<Vec3>() / 3.0
                     };
-                    let middles =
-                        || around.get_or_init(|| triangles_around(&mesh))[v].iter().map(|&triangle| middle(triangle));
+                    let middles = || {
+                        around.get_or_init(|| triangles_around(mesh.positions.len(), &mesh.triangles))[v]
+                            .iter()
+                            .map(|&triangle| middle(triangle))
+                    };
                     let neighbours = || {
-                        let triangles = around.get_or_init(|| triangles_around(&mesh))[v].iter();
+                        let triangles =
+                            around.get_or_init(|| triangles_around(mesh.positions.len(), &mesh.triangles))[v].iter();
                         let corners = triangles.flat_map(|&triangle| mesh.triangles[triangle as usize]);
                         corners.filter(|corner| *corner as usize != v).map(|corner| mesh.positions[corner as usize])
                     };
@@ -808,6 +866,7 @@ impl GroupSpace<'_> {
                     if !plan.screens.is_empty() {
                         linked.directions.extend(links.iter().map(|link| link.direction));
                     }
+                    hidden_suns[v as usize] = seen.hidden_suns;
                     any_blocked |= seen.blocked > 0.0;
                     transfer[v as usize * stride..][..stride].copy_from_slice(&seen.transfer);
                     if has_maps {
@@ -826,6 +885,7 @@ impl GroupSpace<'_> {
             self_visibility: (any_blocked && any_in_map && has_maps).then(|| Arc::new(maps)),
             near,
             links: (!linked.packed.is_empty()).then(|| Arc::new(linked)),
+            hidden_suns: hidden_suns.iter().any(|hidden| *hidden > 0).then(|| Arc::new(hidden_suns)),
         }
     }
 }
@@ -932,10 +992,10 @@ fn is_within([a, b, c]: [[f32; 2]; 3], [x, y]: [f32; 2]) -> bool {
     sides.iter().all(|side| *side >= 0.0) || sides.iter().all(|side| *side <= 0.0)
 }
 
-/// The triangles around every vertex of a mesh.
-fn triangles_around(mesh: &Mesh) -> Vec<Vec<u32>> {
-    let mut around = vec![Vec::new(); mesh.positions.len()];
-    for (index, triangle) in (0..).zip(&mesh.triangles) {
+/// The triangles around every vertex.
+pub(super) fn triangles_around(vertices: usize, triangles: &[[u32; 3]]) -> Vec<Vec<u32>> {
+    let mut around = vec![Vec::new(); vertices];
+    for (index, triangle) in (0..).zip(triangles) {
         triangle.iter().for_each(|&v| around[v as usize].push(index));
     }
     around
@@ -950,6 +1010,7 @@ struct StoredSurface {
     refined: bool,
     transfer: bool,
     self_visibility: bool,
+    hidden_suns: bool,
     /// Links, whose counts for every vertex come before them; 0 without counts where no vertex has any.
     links: usize,
     /// Clusters with near members, whose counts and numbers end the payload.
@@ -972,7 +1033,7 @@ impl GroupPlan {
         let mut payload = Vec::new();
         let mut stored = Vec::new();
         for (member, surface) in self.members.iter().zip(surfaces) {
-            let BakedSurface { mesh, transfer, self_visibility, near, links } = surface;
+            let BakedSurface { mesh, transfer, self_visibility, near, links, hidden_suns } = surface;
             let refined = !Arc::ptr_eq(mesh, &member.mesh);
             if refined {
                 payload.extend_from_slice(bytemuck::cast_slice(&mesh.positions));
@@ -988,6 +1049,9 @@ impl GroupPlan {
             if let Some(maps) = self_visibility {
                 payload.extend_from_slice(maps);
             }
+            if let Some(hidden) = hidden_suns {
+                payload.extend_from_slice(bytemuck::cast_slice(hidden));
+            }
             if let Some(links) = links {
                 payload.extend_from_slice(&links.counts);
                 payload.extend_from_slice(bytemuck::cast_slice(&links.packed));
@@ -999,6 +1063,7 @@ impl GroupPlan {
                 refined,
                 transfer: transfer.is_some(),
                 self_visibility: self_visibility.is_some(),
+                hidden_suns: hidden_suns.is_some(),
                 links: links.as_ref().map_or(0, |links| links.packed.len()),
                 clusters: near.len(),
             });
@@ -1057,6 +1122,10 @@ impl GroupPlan {
                 true => Some(Arc::new(take(stored.vertices.checked_mul(BYTES)?)?.to_vec())),
                 false => None,
             };
+            let hidden_suns = match stored.hidden_suns {
+                true => Some(Arc::new(vectors(&mut take, stored.vertices)?)),
+                false => None,
+            };
             let links = match stored.links {
                 0 => None,
                 links => {
@@ -1073,7 +1142,7 @@ impl GroupPlan {
                 let count: u32 = bytemuck::pod_read_unaligned(take(4)?);
                 near.push(bytemuck::pod_collect_to_vec(take(4 * count as usize)?));
             }
-            surfaces.push(BakedSurface { mesh, transfer, self_visibility, near, links });
+            surfaces.push(BakedSurface { mesh, transfer, self_visibility, near, links, hidden_suns });
         }
         rest.is_empty().then_some(surfaces)
     }

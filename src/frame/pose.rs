@@ -16,6 +16,9 @@ use crate::sh::rotation::turns;
 use glam::DVec3;
 use std::f64::consts::PI;
 
+/// Distance of unit vectors to suns that are one.
+const SAME_SUN: f64 = 1e-6;
+
 impl Frame {
     /// All that lists and merge depend on at this time.
     pub(super) fn state(&self, placements: &[Placement]) -> State {
@@ -121,6 +124,14 @@ impl Frame {
         }
     }
 
+    /// The bit of a sun among those that vertices tell hidden; 0 of what is none, and of one that has moved since.
+    pub(super) fn sun_bit(&self, index: usize, placement: &Placement) -> u32 {
+        let is_sun = index >= self.scene.data.entities.len() && index < self.scene.entities.len();
+        let toward = placement.position.as_dvec3().normalize_or_zero();
+        let suns = self.buffers.suns.iter().filter(|_| is_sun);
+        suns.zip(0..).find(|(sun, _)| sun.distance(toward) < SAME_SUN).map_or(0, |(_, bit)| 1 << bit)
+    }
+
     fn entity(&self, index: usize, placement: &Placement) -> layout::DeviceEntity {
         let entity = &self.scene.entities[index];
         let device_mesh = &self.buffers.meshes[entity.mesh];
@@ -181,6 +192,7 @@ impl Frame {
             blocked_base: device_mesh.blocked.as_ref().map_or(0, FieldSlot::quad),
             radiance_base,
             irradiance_first: self.radiosity.irradiance_first(index).unwrap_or(NONE),
+            hidden_bit: self.sun_bit(index, placement),
             ..layout::DeviceEntity::default()
         }
     }

@@ -249,13 +249,18 @@ impl FrameTwin<'_> {
             own_normal: *normal,
         };
         let points: Vec<SurfacePoint> = receiver.positions.iter().zip(&receiver.normals).map(point).collect();
+        let hidden_suns = &self.frame.buffers.surface(receiver.index).hidden_suns;
+        let is_hidden = |v: usize, light: usize| {
+            let hidden = hidden_suns.as_ref().map_or(0, |hidden| hidden[v]);
+            hidden & self.frame.sun_bit(light, &self.placements[light]) != 0
+        };
         let twin = SharpTwin {
             objects: outlines,
             occluders: &occluders,
             receiver: receiver.index,
             self_maps: self_maps.as_deref().map(|maps| &maps[..]),
             lights: &lights,
-            leaves: &|v, j, light| leaves(v, j, Some(light)),
+            leaves: &|v, j, light| leaves(v, j, Some(light)) || (j == light && is_hidden(v, light)),
             encloses: &|v, j, light| {
                 let is_around = |globe: &&Globe| [globe.occluder, globe.light] == [j as u32, light as u32];
                 let globe = self.globes.iter().find(is_around);

@@ -93,7 +93,9 @@ float share_in_outline(View view, mat3 surface, SeenLight light, mat3 axes, Outl
     turn = abs(turn) < 1e-20 ? 1e-20 : turn;
     vec2 across = vec2(second.x * middle.y - second.y * middle.x, first.y * middle.x - first.x * middle.y) / turn;
     across = clamp(across, -1e9, 1e9);
-    bool whole = outline.polygon && radius > max(WIDE_OUTLINE * (1.0 + away), footprint);
+    // A strip is long before its area is large.
+    float widest = max(dot(first, first), dot(second, second));
+    bool whole = outline.polygon && widest > WIDE_OUTLINE * (1.0 + away) && radius > footprint;
     float share = share_in_rectangle(view, surface, light, axes, outline, whole ? 4 : 0);
     if (!whole) {
         // An ellipse that is wide counts by where its own outline lies.

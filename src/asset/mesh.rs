@@ -373,7 +373,7 @@ impl Mesh {
     }
 
     /// The same, with the box that it is itself.
-    pub(super) fn as_boxes(&self) -> Vec<PlacedCuboid> {
+    pub(crate) fn as_boxes(&self) -> Vec<PlacedCuboid> {
         let placed =
             |cuboid| PlacedCuboid { centre_m: self.centre.as_dvec3(), radius_m: f64::from(self.radius_m), cuboid };
         self.cuboid.map_or_else(|| self.boxes.clone(), |cuboid| vec![placed(cuboid)])

@@ -21,6 +21,7 @@ mod prepare;
 mod probe;
 mod radiosity;
 mod record;
+mod seams;
 mod sky;
 mod twin;
 mod viewport;
@@ -77,6 +78,8 @@ pub struct Frame {
     scene: Scene,
     /// Which entities never move against each other.
     groups: Groups,
+    /// How far the rectangles that entities are reach into boxes; see [`seams::reaches`].
+    reaches: Vec<[f64; 2]>,
     /// What the own visibility of the vertices was baked for.
     surfaces: SurfacePlan,
     methods: Vec<LightMethod>,
@@ -217,6 +220,7 @@ impl Frame {
         Ok(Frame {
             device: device.clone(),
             library: library.clone(),
+            reaches: seams::reaches(&scene, &placements),
             scene,
             groups: needs.groups,
             surfaces: needs.surfaces,

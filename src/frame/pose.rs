@@ -268,7 +268,8 @@ impl Frame {
         let Rectangle { axes, half_m } = self.buffers.meshes[self.scene.entities[index].mesh].rectangle?;
         let rotation = placement.turn();
         let scale = f64::from(placement.scale);
-        let rectangle = Rectangle { axes: axes.map(|axis| rotation * axis), half_m: half_m.map(|half| half * scale) };
+        let half = |axis: usize| scale * (half_m[axis] + self.reaches[index][axis]);
+        let rectangle = Rectangle { axes: axes.map(|axis| rotation * axis), half_m: [half(0), half(1)] };
         Some(Sheet { centre: self.centre(index, placement), rectangle })
     }
 

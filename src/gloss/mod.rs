@@ -51,7 +51,8 @@ pub const LEAST_HALF_Z: f64 = 1e-3;
 pub const WIDENED: f64 = 0.35;
 /// Largest area of slopes by which they become wider: where view and light graze it has no bound.
 pub const MOST_SLOPES: f64 = 1.0;
-/// Area of a rectangle of light as slopes from which on it is no disc, over pi (1 + p^2), where it lies at p.
+/// Square of half a rectangle of light's longer diagonal as slopes from which on it is no disc, over 1 + p^2, where it lies
+/// at p.
 pub const WIDE_OUTLINE: f64 = 0.01;
 /// Where the cosine between the normal and that of a microfacet that mirrors the light's rim, over alpha, is below the
 /// first, the light is a point; above the second it is its outline.

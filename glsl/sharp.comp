@@ -23,7 +23,7 @@ READ_UVEC2(7, SelfCells, self_cells, self_cell)
 #endif
 #define FACINGS 1
 #define HIDES 1
-uint hidden_suns; // of the vertex: see `hidden_bit`
+uint told_suns; // of the vertex: src/layout.rs
 #if EDGES
 #define KEEPS 1
 // Bits of floats, of all vertices by one light after another.
@@ -62,7 +62,7 @@ void main() {
 #endif
     vec4 facing = vertex_quad(at + 1);
     surface.facings[0] = facing_of(receiver, facing.xyz, 1.0, cluster.self_first, v);
-    hidden_suns = uint(facing.w);
+    told_suns = uint(facing.w);
     vec4 sum = soft_at(cluster.radiosity_first + v);
 #if EDGES
     vec3 soft = sum.rgb;

@@ -506,6 +506,14 @@ vec3 chain_sum(Surface surface, uint i, uint end) {
     }
 #endif
     float radius = 1.0 / shining.centre.w;
+#if HIDES
+    bool is_hidden = (told_suns & shining.sun_bit) != 0;
+    bool is_sure = (told_suns >> MOST_SUNS & (is_hidden ? shining.sun_bit : shining.free_bit)) != 0;
+    i = is_sure ? end : i;
+#if SELF
+    surface.facings[0].self_first = is_sure ? NONE : surface.facings[0].self_first;
+#endif
+#endif
     uint first_block = light.fine >= 1.0 ? 1 : 0, last_block = light.fine <= 0.0 ? 0 : 4;
     vec4 shares[BLOCKS]; // irradiance by the parts of each block
 #if SHOWN || PANELS
@@ -659,8 +667,7 @@ vec3 chain_sum(Surface surface, uint i, uint end) {
     float miss = add_open(unblocked, cone, shining);
 #endif
 #if HIDES
-    // Pixels around the vertex may still see some of that sun.
-    bool is_hidden = (hidden_suns & shining.hidden_bit) != 0;
+    // Pixels around the vertex may still see some of that sun, unless it is sure.
     cone = is_hidden ? 0.0 : cone;
 #endif
 #if SHOWN

@@ -111,11 +111,20 @@ shared_struct! {
         irradiance_first: u32,
         /// Of a tube: its thickness over its width, 1 of a round one; see [`crate::field::sub_light::LampFace::Tube`].
         light_thin: f32,
-        /// Of a sun: its bit among those that a vertex tells hidden; 0 of any other light.
-        hidden_bit: u32,
-        /// Texels hold a multiple of four words.
-        unused: f32,
+        /// Of a sun: its bit among those that a vertex tells hidden, see [`told_suns`]; 0 of any other light.
+        sun_bit: u32,
+        /// The same where nothing that moves may hide a sun of which a vertex sees all.
+        free_bit: u32,
     }
+}
+
+/// The most suns of which vertices tell whether they are hidden.
+pub const MOST_SUNS: usize = 12;
+
+/// A vertex tells of each sun whether it is hidden, a bit each, and [`MOST_SUNS`] bits on whether that is sure: a sun that
+/// is not hidden then shines on all around. A float holds all of them.
+pub fn told_suns(hidden: u32, sure: u32) -> u32 {
+    hidden | sure << MOST_SUNS
 }
 
 impl DeviceEntity {
@@ -385,7 +394,7 @@ pub const TAG_STEP: f32 = 1.0 / 255.0;
 pub const COSINE_LOBE: [f64; 3] = [0.09375, 0.5, 0.46875];
 
 /// The macros that every shader has: what both languages have to agree on.
-pub fn shared_macros() -> [(&'static str, String); 15] {
+pub fn shared_macros() -> [(&'static str, String); 16] {
     let [a, b, c] = COSINE_LOBE;
     let kind = |kind: LightKind| format!("{}u", kind as u32);
     [
@@ -395,6 +404,7 @@ pub fn shared_macros() -> [(&'static str, String); 15] {
         ("HAS_HALVES", format!("{HAS_HALVES:#x}u")),
         ("OWN_MAPS", format!("{OWN_MAPS:#x}u")),
         ("MARKED_OCCLUDERS", format!("{MARKED_OCCLUDERS}u")),
+        ("MOST_SUNS", format!("{MOST_SUNS}u")),
         ("FIT_BITS", FIT_BITS.to_string()),
         ("TAG_STEP", format!("{TAG_STEP:?}")),
         ("COSINE_LOBE", format!("vec3({a:?}, {b:?}, {c:?})")),

@@ -28,7 +28,7 @@ const MOST_LEFT: f32 = 0.0025;
 /// Of the vertices that may be added one in so many follows the shadows of suns.
 const SUNS_SHARE: usize = 4;
 /// Weights of a triangle's corners at the places where a sun is looked for.
-const WITHIN: [[f32; 3]; 10] = [
+pub(super) const ON_TRIANGLE: [[f32; 3]; 10] = [
     [0.96, 0.02, 0.02],
     [0.02, 0.96, 0.02],
     [0.02, 0.02, 0.96],
@@ -228,7 +228,7 @@ impl Refined {
             let across = (corners[1] - corners[0]).cross(corners[2] - corners[0]);
             let mix = |of: [Vec3; 3], [a, b, c]: [f32; 3]| a * of[0] + b * of[1] + c * of[2];
             suns.iter().filter(|(_, local)| across.dot(*local) > 0.0).any(|(sun, _)| {
-                let mut lit = WITHIN.iter().map(|at| space.sees(mix(corners, *at) + mix(nudges, *at), *sun));
+                let mut lit = ON_TRIANGLE.iter().map(|at| space.sees(mix(corners, *at) + mix(nudges, *at), *sun));
                 let first = lit.next();
                 lit.any(|lit| Some(lit) != first)
             })

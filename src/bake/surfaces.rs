@@ -5,7 +5,7 @@ use super::cluster_order::cluster_order;
 use super::links::{Link, Met, RUNS, Runs, links};
 use super::own_visibility::{Counts, Eye, Front, PATTERN, Rays, Seen, Standing, Target, directions, see};
 use super::packet::{BlockerHit, BlockerTriangle, Blockers, Mask};
-use super::refine::{FLAT, Limits, Refined, refine};
+use super::refine::{FLAT, Limits, ON_TRIANGLE, Refined, refine};
 use super::triangles::{distinct, weights};
 use super::visibility_volume::VolumePlan;
 use super::{BakeReport, Options, Progress, TRANSFER_OFFSET, Wanted, bakes_transfer};
@@ -18,7 +18,7 @@ use crate::asset::mesh::Attributes;
 use crate::asset::texture::Texture;
 use crate::field::quantity::channel_stride;
 use crate::field::self_visibility::{self, BYTES};
-use crate::layout::CLUSTER_VERTICES;
+use crate::layout::{CLUSTER_VERTICES, MOST_SUNS, told_suns};
 use crate::scene::groups::Groups;
 use crate::scene::{Placement, Scene};
 use glam::{DMat3, DVec3, Mat3A, Quat, Vec3, Vec3A};
@@ -30,7 +30,7 @@ use std::sync::{Arc, OnceLock};
 use std::time::Instant;
 
 /// Counts in every name of the cache: another number where a bake of surfaces computes something else.
-const VERSION: u32 = 39;
+const VERSION: u32 = 40;
 /// How far towards the middle of its triangles a vertex is seen from, as a share of the way: the light of a crease is
 /// that just inside each face. Where meshes are left as they are, so are the places from which they are seen.
 const NUDGE: f32 = 0.02;
@@ -48,10 +48,8 @@ const WITHIN: f64 = 0.02;
 /// around it, wherever its middle is. So many vertices look, each in so many directions.
 const AROUND: f64 = 0.6;
 const LOOKS: [usize; 2] = [16, 64];
-/// Angular radius below which the shadows of a sun have edges that surfaces follow: 3 degrees; and the most such suns, for
-/// each of which a vertex has a bit in a float.
+/// Angular radius below which the shadows of a sun have edges that surfaces follow: 3 degrees.
 const CRISP_RAD: f64 = 0.05;
-const MOST_SUNS: usize = 24;
 /// Where rays to a sun leave its middle, in its angular radii, along two axes.
 const SUN_RAYS: [[f64; 2]; 5] = [[0.0, 0.0], [0.8, 0.0], [0.0, 0.8], [-0.8, 0.0], [0.0, -0.8]];
 /// Of the vertices to which surfaces may grow one in so many is added at least, however many there were: a floor below a
@@ -138,8 +136,8 @@ pub struct BakedSurface {
     pub near: Vec<Vec<u32>>,
     /// What every vertex sees of its group's fronts, in the order of clusters; `None` where none sees any.
     pub links: Option<Arc<Links>>,
-    /// In the mesh's order of vertices a bit for each of the group's suns that is hidden; `None` where none is.
-    pub hidden_suns: Option<Arc<Vec<u32>>>,
+    /// In the mesh's order of vertices [`told_suns`]; `None` where they tell nothing.
+    pub told_suns: Option<Arc<Vec<u32>>>,
 }
 
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -161,7 +159,7 @@ impl BakedSurface {
             self_visibility: None,
             near: Vec::new(),
             links: None,
-            hidden_suns: None,
+            told_suns: None,
         }
     }
 }
@@ -642,7 +640,7 @@ impl GroupSpace<'_> {
             seen.cover();
         }
         if rays == Rays::Many {
-            seen.hidden_suns = self.hidden_suns(position + nudge, normal);
+            [seen.hidden_suns, _] = self.seen_suns(position + nudge, normal);
         }
         let sees_backs = seen.blocked > BURIED_BLOCKED && seen.behind > BURIED_BACKS * seen.blocked;
         seen.buried = group.plan.refinement.is_some() && (is_covered || sees_backs);
@@ -670,12 +668,12 @@ impl GroupSpace<'_> {
         self.group.place(self.own().placement.point(point.as_dvec3()))
     }
 
-    /// A bit for each of the group's suns of which a point that faces it sees nothing. Outlines of what surrounds a point,
-    /// as those of a house, tell this badly near its walls.
-    fn hidden_suns(&self, point: Vec3, normal: Vec3) -> u32 {
+    /// Bits of the group's suns of which a point that faces them sees nothing, and of those of which it sees all. Outlines
+    /// of what surrounds a point, as those of a house, tell this badly near its walls.
+    fn seen_suns(&self, point: Vec3, normal: Vec3) -> [u32; 2] {
         let origin = self.placed(point);
         let mut hits = Vec::with_capacity(SUN_RAYS.len());
-        let mut hidden = 0;
+        let [mut hidden, mut free] = [0, 0];
         for (number, sun) in self.group.plan.suns.iter().enumerate() {
             if normal.dot(self.local(sun.toward)) <= 0.0 {
                 continue;
@@ -685,8 +683,50 @@ impl GroupSpace<'_> {
             hits.clear();
             self.group.blockers.first(origin, &Mat3A::IDENTITY, &SUN_RAYS.map(ray), &self.blocks, &mut hits);
             hidden |= u32::from(hits.iter().all(Option::is_some)) << number;
+            free |= u32::from(hits.iter().all(Option::is_none)) << number;
         }
-        hidden
+        [hidden, free]
+    }
+
+    /// For each triangle, the same of places all over it, as far as they face a sun: those that none of them sees anything
+    /// of, and those that all see all of.
+    fn suns_on_triangles(&self, mesh: &Mesh, nudges: &[Vec3]) -> Vec<[u32; 2]> {
+        let all = (1_u32 << self.group.plan.suns.len()) - 1;
+        let on = |triangle: &[u32; 3]| {
+            let blend = |of: &dyn Fn(usize) -> Vec3, weights: [f32; 3]| {
+                triangle.iter().zip(weights).map(|(&v, weight)| weight * of(v as usize)).sum::<Vec3>()
+            };
+            let mut common = [all; 2];
+            for weights in ON_TRIANGLE {
+                let normal = blend(&|v| mesh.normals[v], weights).normalize_or_zero();
+                let off = blend(&|v| nudges[v].dot(mesh.normals[v]) * mesh.normals[v], weights);
+                let point = blend(&|v| mesh.positions[v], weights) + off;
+                let faces = (0..).zip(&self.group.plan.suns);
+                let faces = faces.filter(|(_, sun)| normal.dot(self.local(sun.toward)) > 0.0);
+                let away = all & !faces.fold(0, |bits, (number, _)| bits | 1 << number);
+                let seen = self.seen_suns(point, normal);
+                (0..2).for_each(|k| common[k] &= seen[k] | away);
+            }
+            common
+        };
+        mesh.triangles.par_iter().map(on).collect()
+    }
+
+    /// What every vertex tells of the group's suns, from those that are hidden there: [`told_suns`].
+    fn told_suns(&self, mesh: &Mesh, nudges: &[Vec3], hidden: &[u32]) -> Vec<u32> {
+        if self.group.plan.suns.is_empty() {
+            return vec![0; hidden.len()];
+        }
+        let mut common = vec![[u32::MAX; 2]; hidden.len()];
+        for (triangle, seen) in mesh.triangles.iter().zip(self.suns_on_triangles(mesh, nudges)) {
+            triangle.iter().for_each(|&v| (0..2).for_each(|k| common[v as usize][k] &= seen[k]));
+        }
+        let all = (1_u32 << self.group.plan.suns.len()) - 1;
+        let told = |(hidden, [dark, free]): (&u32, &[u32; 2])| {
+            let dark = dark & all;
+            told_suns(hidden | dark, dark | (free & all & !hidden))
+        };
+        hidden.iter().zip(&common).map(told).collect()
     }
 
     /// Whether the way from a point of the member's frame towards a sun is free.
@@ -879,13 +919,14 @@ impl GroupSpace<'_> {
             }
             told(done);
         }
+        let told_suns = self.told_suns(&mesh, nudges, &hidden_suns);
         BakedSurface {
             mesh,
             transfer: (any_blocked && wanted.transfer).then(|| Arc::new(transfer)),
             self_visibility: (any_blocked && any_in_map && has_maps).then(|| Arc::new(maps)),
             near,
             links: (!linked.packed.is_empty()).then(|| Arc::new(linked)),
-            hidden_suns: hidden_suns.iter().any(|hidden| *hidden > 0).then(|| Arc::new(hidden_suns)),
+            told_suns: told_suns.iter().any(|told| *told > 0).then(|| Arc::new(told_suns)),
         }
     }
 }
@@ -1010,7 +1051,7 @@ struct StoredSurface {
     refined: bool,
     transfer: bool,
     self_visibility: bool,
-    hidden_suns: bool,
+    told_suns: bool,
     /// Links, whose counts for every vertex come before them; 0 without counts where no vertex has any.
     links: usize,
     /// Clusters with near members, whose counts and numbers end the payload.
@@ -1033,7 +1074,7 @@ impl GroupPlan {
         let mut payload = Vec::new();
         let mut stored = Vec::new();
         for (member, surface) in self.members.iter().zip(surfaces) {
-            let BakedSurface { mesh, transfer, self_visibility, near, links, hidden_suns } = surface;
+            let BakedSurface { mesh, transfer, self_visibility, near, links, told_suns } = surface;
             let refined = !Arc::ptr_eq(mesh, &member.mesh);
             if refined {
                 payload.extend_from_slice(bytemuck::cast_slice(&mesh.positions));
@@ -1049,8 +1090,8 @@ impl GroupPlan {
             if let Some(maps) = self_visibility {
                 payload.extend_from_slice(maps);
             }
-            if let Some(hidden) = hidden_suns {
-                payload.extend_from_slice(bytemuck::cast_slice(hidden));
+            if let Some(told) = told_suns {
+                payload.extend_from_slice(bytemuck::cast_slice(told));
             }
             if let Some(links) = links {
                 payload.extend_from_slice(&links.counts);
@@ -1063,7 +1104,7 @@ impl GroupPlan {
                 refined,
                 transfer: transfer.is_some(),
                 self_visibility: self_visibility.is_some(),
-                hidden_suns: hidden_suns.is_some(),
+                told_suns: told_suns.is_some(),
                 links: links.as_ref().map_or(0, |links| links.packed.len()),
                 clusters: near.len(),
             });
@@ -1122,7 +1163,7 @@ impl GroupPlan {
                 true => Some(Arc::new(take(stored.vertices.checked_mul(BYTES)?)?.to_vec())),
                 false => None,
             };
-            let hidden_suns = match stored.hidden_suns {
+            let told_suns = match stored.told_suns {
                 true => Some(Arc::new(vectors(&mut take, stored.vertices)?)),
                 false => None,
             };
@@ -1142,7 +1183,7 @@ impl GroupPlan {
                 let count: u32 = bytemuck::pod_read_unaligned(take(4)?);
                 near.push(bytemuck::pod_collect_to_vec(take(4 * count as usize)?));
             }
-            surfaces.push(BakedSurface { mesh, transfer, self_visibility, near, links, hidden_suns });
+            surfaces.push(BakedSurface { mesh, transfer, self_visibility, near, links, told_suns });
         }
         rest.is_empty().then_some(surfaces)
     }

@@ -78,6 +78,8 @@ pub struct Frame {
     scene: Scene,
     /// Which entities never move against each other.
     groups: Groups,
+    /// Whether all that occludes rests and is opaque, so that rays from where it stands know all of it.
+    is_still: bool,
     /// How far the rectangles that entities are reach into boxes; see [`seams::reaches`].
     reaches: Vec<[f64; 2]>,
     /// What the own visibility of the vertices was baked for.
@@ -220,6 +222,10 @@ impl Frame {
         Ok(Frame {
             device: device.clone(),
             library: library.clone(),
+            is_still: (0..scene.entities.len()).all(|entity| {
+                let of = &scene.entities[entity];
+                !of.occludes || (scene.is_at_rest(entity) && !of.transparent && of.opacity >= 1.0)
+            }),
             reaches: seams::reaches(&scene, &placements),
             scene,
             groups: needs.groups,

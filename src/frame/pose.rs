@@ -192,7 +192,8 @@ impl Frame {
             blocked_base: device_mesh.blocked.as_ref().map_or(0, FieldSlot::quad),
             radiance_base,
             irradiance_first: self.radiosity.irradiance_first(index).unwrap_or(NONE),
-            hidden_bit: self.sun_bit(index, placement),
+            sun_bit: self.sun_bit(index, placement),
+            free_bit: if self.is_still { self.sun_bit(index, placement) } else { 0 },
             ..layout::DeviceEntity::default()
         }
     }

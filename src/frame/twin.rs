@@ -6,7 +6,7 @@ use crate::error::Result;
 use crate::field::cuboid::PlacedCuboid;
 use crate::field::{Area, ShadowField, self_visibility};
 use crate::gpu::Buffer;
-use crate::layout::{CLUSTER_VERTICES, Cluster, ENTRY_ENTITIES, ListEntry};
+use crate::layout::{CLUSTER_VERTICES, Cluster, ENTRY_ENTITIES, ListEntry, MOST_SUNS};
 use crate::lists::gather::Globe;
 use crate::merge::twin::{MergeObject, MergeTwin};
 use crate::scene::{LightMethod, Placement};
@@ -249,18 +249,20 @@ impl FrameTwin<'_> {
             own_normal: *normal,
         };
         let points: Vec<SurfacePoint> = receiver.positions.iter().zip(&receiver.normals).map(point).collect();
-        let hidden_suns = &self.frame.buffers.surface(receiver.index).hidden_suns;
-        let is_hidden = |v: usize, light: usize| {
-            let hidden = hidden_suns.as_ref().map_or(0, |hidden| hidden[v]);
-            hidden & self.frame.sun_bit(light, &self.placements[light]) != 0
-        };
+        let told_suns = &self.frame.buffers.surface(receiver.index).told_suns;
         let twin = SharpTwin {
             objects: outlines,
             occluders: &occluders,
             receiver: receiver.index,
             self_maps: self_maps.as_deref().map(|maps| &maps[..]),
             lights: &lights,
-            leaves: &|v, j, light| leaves(v, j, Some(light)) || (j == light && is_hidden(v, light)),
+            leaves: &|v, j, light| leaves(v, j, Some(light)),
+            sees: &|v, light| {
+                let told = told_suns.as_ref().map_or(0, |told| told[v]);
+                let bit = self.frame.sun_bit(light, &self.placements[light]);
+                let is_free = told >> MOST_SUNS & !told & bit != 0 && self.frame.is_still;
+                if told & bit != 0 { Some(false) } else { is_free.then_some(true) }
+            },
             encloses: &|v, j, light| {
                 let is_around = |globe: &&Globe| [globe.occluder, globe.light] == [j as u32, light as u32];
                 let globe = self.globes.iter().find(is_around);

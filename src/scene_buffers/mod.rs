@@ -63,8 +63,8 @@ pub struct DeviceSurface {
     pub self_first: u32,
     /// Self-visibility in the mesh's order of vertices, if it needs any.
     pub self_maps: Option<Arc<Vec<u8>>>,
-    /// See [`BakedSurface::hidden_suns`].
-    pub hidden_suns: Option<Arc<Vec<u32>>>,
+    /// See [`BakedSurface::told_suns`].
+    pub told_suns: Option<Arc<Vec<u32>>>,
     pub drawn: DrawnMesh,
     /// How far a point of a triangle may lie from a vertex of it, metres.
     pub reach_m: f32,
@@ -100,7 +100,7 @@ pub struct SceneBuffers {
 /// Vertices and their own visibility on their way into the buffers of a scene.
 struct Packing {
     /// Two quads a vertex: its position about the centre of the mesh's bounding sphere and how far its farthest
-    /// neighbour is, metres; and its normal, and the bits of suns that are hidden there, as a number.
+    /// neighbour is, metres; and its normal, and what it tells of suns ([`crate::layout::told_suns`]), as a number.
     vertices: Vec<[f32; 4]>,
     transfers: Vec<f32>,
     self_cells: Vec<[u32; 2]>,
@@ -124,8 +124,8 @@ impl Packing {
         let reach_m = drawn.grid().map_or_else(longest, |grid| grid.reach_m);
         for &v in &order {
             vertices.push((mesh.positions[v as usize] - centre).extend(steps[v as usize]).to_array());
-            let hidden = baked.hidden_suns.as_ref().map_or(0, |hidden| hidden[v as usize]);
-            vertices.push(mesh.normals[v as usize].extend(hidden as f32).to_array());
+            let told = baked.told_suns.as_ref().map_or(0, |told| told[v as usize]);
+            vertices.push(mesh.normals[v as usize].extend(told as f32).to_array());
         }
         let transfer_first = baked.transfer.as_ref().map_or(NONE, |floats| {
             let first = (transfers.len() / 4) as u32;
@@ -141,7 +141,7 @@ impl Packing {
         Ok(DeviceSurface {
             self_first,
             self_maps: baked.self_visibility.clone(),
-            hidden_suns: baked.hidden_suns.clone(),
+            told_suns: baked.told_suns.clone(),
             vertices: vertex_first / 2..vertices.len() as u32 / 2,
             clusters: clusters::bounds(mesh, &order),
             faces: TriangleRun::around(mesh, &order, CLUSTER_VERTICES as usize),

@@ -36,7 +36,7 @@ pub struct Global {
     /// Print more log lines on stderr; give it twice for all
     #[arg(short, long, global = true, action = clap::ArgAction::Count)]
     pub verbose: u8,
-    /// Show no progress bars
+    /// Show no progress, neither bars nor the lines that stand for them where stderr is no terminal
     #[arg(long, global = true)]
     pub no_progress: bool,
     /// Folder for baked fields, compiled shaders and what the window remembers; default: shadow-fields in the XDG cache

@@ -7,7 +7,7 @@ use indicatif::{MultiProgress, ProgressBar, ProgressDrawTarget, ProgressStyle};
 use std::io::{IsTerminal, Write};
 use std::path::Path;
 use std::sync::{Mutex, PoisonError};
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 /// The first error that kept results from being written.
 static UNWRITTEN: Mutex<Option<std::io::Error>> = Mutex::new(None);
@@ -80,10 +80,15 @@ pub fn start_log(global: &Global) {
     let _ = env_logger::Builder::from_env(environment).format(line).try_init();
 }
 
-/// A progress bar for each piece of work that is being done, and a line where shaders are compiled. Nothing is shown where
-/// stderr is no terminal or bars are not wanted.
+/// Time between lines of progress where stderr is no terminal.
+const LINE_EVERY: Duration = Duration::from_secs(10);
+
+/// A progress bar for each piece of work that is being done, and a line where shaders are compiled. Where stderr is no
+/// terminal, a line now and then; nothing where progress is not wanted.
 pub struct Progress {
     hidden: bool,
+    /// When the last line was written, where stderr is no terminal.
+    line: Option<Mutex<Instant>>,
     bars: MultiProgress,
     /// Those that are not done, and their names.
     current: Mutex<Vec<(String, ProgressBar)>>,
@@ -92,7 +97,9 @@ pub struct Progress {
 impl Progress {
     /// A bar as the global options want it.
     pub fn new(global: &Global) -> Self {
-        let hidden = global.no_progress || global.quiet || !std::io::stderr().is_terminal();
+        let unwanted = global.no_progress || global.quiet;
+        let is_terminal = std::io::stderr().is_terminal();
+        let hidden = unwanted || !is_terminal;
         let bars = MultiProgress::with_draw_target(ProgressDrawTarget::stderr());
         if !hidden {
             let lines = bars.clone();
@@ -101,32 +108,40 @@ impl Progress {
                 let _ = lines.println(one_line(&line)); // a line that failed is no reason to fail
             });
         }
-        Progress { hidden, bars, current: Mutex::default() }
+        let line = (!unwanted && !is_terminal).then(|| Mutex::new(Instant::now()));
+        Progress { hidden, line, bars, current: Mutex::default() }
     }
 
     /// Shows that `done` of `all` samples of `what` are baked.
     pub fn show(&self, what: &str, done: u32, all: u32) {
-        self.bar(what, "baking {msg:24} [{bar:32}] {pos}/{len} samples, {eta} left", done, all);
+        self.bar(&format!("baking {what}"), "{msg:24} [{bar:32}] {pos}/{len} samples, {eta} left", done, all);
     }
 
     /// Shows that `done` of `all` pictures are rendered; a single one needs no bar.
     pub fn pictures(&self, done: u32, all: u32) {
         if all > 1 {
-            self.bar("pictures", "rendering [{bar:32}] {pos}/{len} {msg}, {eta} left", done, all);
+            self.bar("rendering pictures", "{msg} [{bar:32}] {pos}/{len}, {eta} left", done, all);
         }
     }
 
     /// Shows that rays were cast for `done` of `all` rows of pixels.
     pub fn rows(&self, done: u32, all: u32) {
-        self.bar("rows", "casting rays [{bar:32}] {pos}/{len} {msg}, {eta} left", done, all);
+        self.bar("casting rays by rows", "{msg} [{bar:32}] {pos}/{len}, {eta} left", done, all);
     }
 
     /// Shows that `done` of `all` slices are done.
     pub fn slices(&self, done: u32, all: u32) {
-        self.bar("slices", "running [{bar:32}] {pos}/{len} {msg}, {eta} left", done, all);
+        self.bar("running slices", "{msg} [{bar:32}] {pos}/{len}, {eta} left", done, all);
     }
 
     fn bar(&self, what: &str, template: &str, done: u32, all: u32) {
+        if let Some(line) = &self.line {
+            let mut last = line.lock().unwrap_or_else(PoisonError::into_inner);
+            if last.elapsed() > LINE_EVERY {
+                *last = Instant::now();
+                eprintln!("{}: {done} of {all}", one_line(what));
+            }
+        }
         if self.hidden {
             return;
         }

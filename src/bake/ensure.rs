@@ -217,6 +217,12 @@ pub fn ensure(
     Ok(BakedScene { meshes, baked, ..surfaces })
 }
 
+fn noted(what: &str, report: Option<BakeReport>) -> Option<Baked> {
+    let report = report?;
+    log::info!("{what}: baked in {:.1} s", report.total.as_secs_f64());
+    Some(Baked { what: what.to_owned(), report })
+}
+
 fn ensure_fields(
     baker: &Baker,
     cache: &Cache,
@@ -226,9 +232,7 @@ fn ensure_fields(
 ) -> Result<(Vec<BakedMesh>, Vec<Baked>)> {
     let options = &needs.options;
     let mut baked = Vec::new();
-    let mut note = |what: &str, report: Option<BakeReport>| {
-        baked.extend(report.map(|report| Baked { what: what.to_owned(), report }));
-    };
+    let mut note = |what: &str, report| baked.extend(noted(what, report));
     // Equal meshes of two names share fields, which are looked for once.
     let mut fields: HashMap<String, Arc<ShadowField>> = HashMap::new();
     let mut silhouettes: HashMap<usize, Arc<SilhouetteField>> = HashMap::new();
@@ -269,9 +273,7 @@ fn ensure_fields(
 /// The scene without its meshes.
 fn ensure_surfaces(cache: &Cache, scene: &Scene, needs: &SceneNeeds, progress: SceneProgress<'_>) -> BakedScene {
     let mut baked = Vec::new();
-    let mut note = |what: &str, report: Option<BakeReport>| {
-        baked.extend(report.map(|report| Baked { what: what.to_owned(), report }));
-    };
+    let mut note = |what: &str, report| baked.extend(noted(what, report));
     let count = scene.entities.len();
     let mut scene_surfaces = Vec::new();
     let mut surface_of = vec![0; count];

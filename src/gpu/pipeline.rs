@@ -7,6 +7,7 @@ use super::reflect::{Binding, VertexInput};
 use super::shader::{Shader, Stage};
 use crate::error::{Error, Result};
 use ash::vk;
+use log::Level;
 use std::sync::Arc;
 use std::time::Instant;
 
@@ -109,11 +110,15 @@ impl Drop for Module<'_> {
     }
 }
 
+/// Pipelines that are made in less time are many, and only traced.
+const LEAST_TOLD_MS: f64 = 5.0;
+
 /// What `made` gives, with a line in the log of how long the driver took for it.
 fn timed<T>(name: &str, made: impl FnOnce() -> T) -> T {
     let start = Instant::now();
     let outcome = made();
-    log::debug!("pipeline {name}: {:.0} ms", start.elapsed().as_secs_f64() * 1e3);
+    let ms = start.elapsed().as_secs_f64() * 1e3;
+    log::log!(if ms < LEAST_TOLD_MS { Level::Trace } else { Level::Debug }, "pipeline {name}: {ms:.0} ms");
     outcome
 }
 

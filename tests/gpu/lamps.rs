@@ -423,6 +423,37 @@ fn a_hall_is_lit_by_the_strip_of_sun_on_its_floor() {
     assert!((0.6..1.6).contains(&ratio), "{ratio}");
 }
 
+/// The sun shines on a closed room from outside. A carpet ends in the plane of a wall, where sun that only reaches the wall's
+/// outside lit its vertices, and light bounced from them filled the room (0.0008 of 60 000 in the mean).
+#[test]
+fn a_closed_room_in_the_sun_is_dark() {
+    let Some(gpu) = gpu() else { return };
+    let sun = Sun { radiance: Vec3::splat(6e4), toward: Vec3::new(0.3, 0.7, -0.6).normalize(), angle_deg: 0.53 };
+    let slab = |x: f32, y: f32, z: f32| generate::cuboid(Vec3::new(x, y, z), 1);
+    let corners = [[-0.8, 5.0], [0.8, 5.0], [0.8, -5.0], [-0.8, -5.0]].map(|[x, z]| Vec3::new(x, 0.01, z));
+    let scene = Scene::builder()
+        .environment(EnvironmentData { sun: Some(sun), ..EnvironmentData::default() })
+        .camera(Camera { fov_deg: 60.0, ..Camera::new([2.5, 1.6, -4.5], [-0.5, 1.0, 4.0]) })
+        .mesh("wall", slab(6.2, 3.0, 0.1))
+        .mesh("side", slab(0.1, 3.0, 10.0))
+        .mesh("floor", slab(6.2, 0.1, 10.2))
+        .mesh("carpet", of_quads("carpet", corners.to_vec()))
+        .entity(stands("wall", [0.0, 1.5, -5.05]))
+        .entity(stands("wall", [0.0, 1.5, 5.05]))
+        .entity(stands("side", [-3.05, 1.5, 0.0]))
+        .entity(stands("side", [3.05, 1.5, 0.0]))
+        .entity(stands("floor", [0.0, -0.05, 0.0]))
+        .entity(stands("floor", [0.0, 3.05, 0.0]))
+        .entity(EntityData::of_mesh("carpet"))
+        .build()
+        .unwrap();
+    let bake = bake::Options { groups: true, ..bake::Options::default() };
+    let options = frame::Options { size: [96, 64], bake, ..frame::Options::default() };
+    let shown = gpu.picture(&scene, options, f32::INFINITY);
+    let mean = shown.iter().sum::<f32>() / shown.len() as f32;
+    assert!(mean < 2e-4, "{mean}");
+}
+
 /// The sun falls through a hole in a cave onto a pool, which is a grid: before the cave, which is around the pool, its
 /// outline hid the half of it (0.55).
 #[test]

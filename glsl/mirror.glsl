@@ -7,7 +7,7 @@ const float TOUCHES = 0.1;
 const float PAST_GAP = 4.0;
 // Widths of texels, over that of slopes, whose blurs with these weights have the same share within any radius as slopes
 // of GGX have, p^2 / (1 + p^2), within 0.03; one alone, of 1.8, within 0.13.
-const vec2 LOBE_WIDTHS = vec2(1.24, MIRROR_WIDER);
+const vec2 LOBE_WIDTHS = vec2(1.24, 4.26);
 const vec2 LOBE_WEIGHTS = vec2(0.683, 0.317);
 
 // The mirror whose plane a pixel lies on; -1 where it lies on none.

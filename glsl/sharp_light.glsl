@@ -507,12 +507,9 @@ vec3 chain_sum(Surface surface, uint i, uint end) {
 #endif
     float radius = 1.0 / shining.centre.w;
 #if HIDES
+    // Where the sun is hidden from all around, no edge of its shadow is looked for.
     bool is_hidden = (told_suns & shining.sun_bit) != 0;
-    bool is_sure = (told_suns >> MOST_SUNS & (is_hidden ? shining.sun_bit : shining.free_bit)) != 0;
-    i = is_sure ? end : i;
-#if SELF
-    surface.facings[0].self_first = is_sure ? NONE : surface.facings[0].self_first;
-#endif
+    i = (told_suns >> MOST_SUNS & shining.sun_bit) != 0 ? end : i;
 #endif
     uint first_block = light.fine >= 1.0 ? 1 : 0, last_block = light.fine <= 0.0 ? 0 : 4;
     vec4 shares[BLOCKS]; // irradiance by the parts of each block
@@ -667,8 +664,8 @@ vec3 chain_sum(Surface surface, uint i, uint end) {
     float miss = add_open(unblocked, cone, shining);
 #endif
 #if HIDES
-    // Pixels around the vertex may still see some of that sun, unless it is sure.
-    cone = is_hidden ? 0.0 : cone;
+    // Pixels around the vertex may still see some of that sun.
+    irradiance = is_hidden ? 0.0 : irradiance;
 #endif
 #if SHOWN
     note_share(chain_light(entry_at(end)), irradiance * cone);

@@ -111,20 +111,20 @@ shared_struct! {
         irradiance_first: u32,
         /// Of a tube: its thickness over its width, 1 of a round one; see [`crate::field::sub_light::LampFace::Tube`].
         light_thin: f32,
-        /// Of a sun: its bit among those that a vertex tells hidden, see [`told_suns`]; 0 of any other light.
+        /// Of a sun: its bit among those that a vertex tells hidden, see [`pack_suns`]; 0 of any other light.
         sun_bit: u32,
-        /// The same where nothing that moves may hide a sun of which a vertex sees all.
-        free_bit: u32,
+        /// Texels hold a multiple of four words.
+        unused: f32,
     }
 }
 
 /// The most suns of which vertices tell whether they are hidden.
 pub const MOST_SUNS: usize = 12;
 
-/// A vertex tells of each sun whether it is hidden, a bit each, and [`MOST_SUNS`] bits on whether that is sure: a sun that
-/// is not hidden then shines on all around. A float holds all of them.
-pub fn told_suns(hidden: u32, sure: u32) -> u32 {
-    hidden | sure << MOST_SUNS
+/// A vertex tells of each sun whether it is hidden, a bit each, and [`MOST_SUNS`] bits on whether it is on all triangles
+/// around. A float holds all of them.
+pub fn pack_suns(hidden: u32, around: u32) -> u32 {
+    hidden | around << MOST_SUNS
 }
 
 impl DeviceEntity {

@@ -36,7 +36,8 @@
 //!   What moves among many of them reads the sky past all at once, from nodes of the box in which it moves
 //!   ([`field::visibility_volume`]). With `--lights sh`, and without the skip `static`, every entity is alone.
 //! - Surfaces: a mesh is lit and drawn with more vertices where its own visibility varies, and along the shadows of suns
-//!   ([`bake::surfaces`]).
+//!   ([`bake::surfaces`]). Vertices of what rests know from rays whether its own group hides a sun; outlines decide where
+//!   its shadow has edges, and where a sun or something else has moved since.
 //! - Entities: everything receives, and everything but emitters occludes. Each can be set per entity. Scales are uniform
 //!   and positive.
 //! - Transparency: what lets light through blocks its opacity's share of a field or an outline. It stands before all
@@ -45,7 +46,7 @@
 //! - Sheets: a flat mesh blocks light from both sides. What a rectangle blocks has a closed form, for SH and for sharp
 //!   lights, so nothing is baked of it; other flat meshes have fields as all others do. A point within 0.002 bounding
 //!   radii of its receiver from the sheet's plane counts as that far from it, on the side of its receiver's centre
-//!   ([`field::sheet`]).
+//!   ([`field::sheet`]). One that ends at boxes, as a ceiling at its walls, reaches a little into them.
 //! - Boxes block sharp lights in closed form too ([`field::cuboid`]), and so do solids with square corners, as houses
 //!   and stairs, as overlapping boxes ([`asset::Mesh::boxes`]). A closed surface that lets light through and holds a
 //!   lamp takes its share once of all that leaves it.

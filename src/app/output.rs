@@ -139,7 +139,7 @@ impl Progress {
             let mut last = line.lock().unwrap_or_else(PoisonError::into_inner);
             if last.elapsed() > LINE_EVERY {
                 *last = Instant::now();
-                eprintln!("{}: {done} of {all}", one_line(what));
+                let _ = writeln!(std::io::stderr().lock(), "{}: {done} of {all}", one_line(what));
             }
         }
         if self.hidden {

@@ -16,7 +16,6 @@ use crate::field::{FieldHeader, FieldKind, ShadowField};
 use crate::scene::Scene;
 use crate::scene::groups::Groups;
 use crate::scene::light::{self, LightMethod, Lights};
-use glam::DVec3;
 use std::collections::{HashMap, HashSet};
 use std::sync::Arc;
 
@@ -43,8 +42,6 @@ pub struct BakedMesh {
 pub struct BakedScene {
     pub meshes: Vec<BakedMesh>,
     pub surfaces: Vec<BakedSurface>,
-    /// See [`SurfacePlan::suns`].
-    pub suns: Vec<DVec3>,
     pub surface_of: Vec<usize>,
     /// For each entity and each of its clusters the entities whose shadows of sharp lights its maps have.
     pub near: Vec<Vec<Vec<u32>>>,
@@ -304,6 +301,5 @@ fn ensure_surfaces(cache: &Cache, scene: &Scene, needs: &SceneNeeds, progress: S
             volume = (!found.blocked.is_empty()).then_some(SceneVolume { volume: found, has });
         }
     }
-    let suns = needs.surfaces.suns();
-    BakedScene { meshes: Vec::new(), surfaces: scene_surfaces, suns, surface_of, near, rigid, volume, baked }
+    BakedScene { meshes: Vec::new(), surfaces: scene_surfaces, surface_of, near, rigid, volume, baked }
 }

@@ -2,7 +2,7 @@
 //! all, and vector instructions take eight of them where the processor has AVX2, or all where it has AVX-512.
 //!
 //! One hierarchy has all triangles, and each member of a group has its own: rays that ask for a few members pass by no
-//! others. Nodes have four children, whose boxes are tested together: a third less time for a ray than with two.
+//! others. Nodes have four children: a ray takes a third less time than with two.
 
 use super::triangles::weights;
 use crate::asset::Mesh;
@@ -129,7 +129,7 @@ struct Corners {
 pub struct BlockerHit {
     pub distance: f32,
     pub member: u32,
-    /// Its place in the hierarchy.
+    /// Its place among the triangles.
     index: u32,
     /// Whether the ray meets its back, where that is no triangle too.
     pub from_behind: bool,
@@ -317,16 +317,14 @@ impl Blockers {
             masks,
             backs,
         };
-        blockers.add(&all);
-        let whole = blockers.nodes.len();
+        let whole = blockers.add(&all);
         all.sort_by_key(|triangle| triangle.member);
         let members = all.last().map_or(0, |last| last.member as usize + 1);
         blockers.of_member = vec![None; members];
         for own in all.chunk_by(|a, b| a.member == b.member) {
             let member = own[0].member as usize;
             // That of an only member is the whole.
-            let is_whole = own.len() == all.len() && whole > 0;
-            blockers.of_member[member] = if is_whole { Some(0) } else { blockers.add(own) };
+            blockers.of_member[member] = if own.len() == all.len() { whole } else { blockers.add(own) };
         }
         blockers
     }

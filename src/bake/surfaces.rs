@@ -18,7 +18,7 @@ use crate::asset::mesh::Attributes;
 use crate::asset::texture::Texture;
 use crate::field::quantity::channel_stride;
 use crate::field::self_visibility::{self, BYTES};
-use crate::layout::{CLUSTER_VERTICES, MOST_SUNS, told_suns};
+use crate::layout::{CLUSTER_VERTICES, MOST_SUNS, pack_suns};
 use crate::scene::groups::Groups;
 use crate::scene::{Placement, Scene};
 use glam::{DMat3, DVec3, Mat3A, Quat, Vec3, Vec3A};
@@ -30,7 +30,7 @@ use std::sync::{Arc, OnceLock};
 use std::time::Instant;
 
 /// Counts in every name of the cache: another number where a bake of surfaces computes something else.
-const VERSION: u32 = 40;
+const VERSION: u32 = 42;
 /// How far towards the middle of its triangles a vertex is seen from, as a share of the way: the light of a crease is
 /// that just inside each face. Where meshes are left as they are, so are the places from which they are seen.
 const NUDGE: f32 = 0.02;
@@ -120,8 +120,18 @@ pub struct GroupPlan {
 #[derive(Clone, Copy, Debug)]
 pub struct CrispSun {
     /// Unit direction, world.
-    pub toward: DVec3,
+    toward: DVec3,
     half_angle_rad: f64,
+}
+
+/// The suns of which surfaces tell whether they are hidden, in the order of their bits, and the place of each among all
+/// discs of the environment.
+pub fn crisp_suns(scene: &Scene) -> impl Iterator<Item = (usize, CrispSun)> {
+    let crisp = |(place, disc): (usize, Disc)| {
+        let Disc { toward, half_angle_rad, .. } = disc;
+        (half_angle_rad < CRISP_RAD).then_some((place, CrispSun { toward, half_angle_rad }))
+    };
+    scene.environment.discs().into_iter().enumerate().filter_map(crisp).take(MOST_SUNS)
 }
 
 /// A surface with its own visibility.
@@ -136,7 +146,7 @@ pub struct BakedSurface {
     pub near: Vec<Vec<u32>>,
     /// What every vertex sees of its group's fronts, in the order of clusters; `None` where none sees any.
     pub links: Option<Arc<Links>>,
-    /// In the mesh's order of vertices [`told_suns`]; `None` where they tell nothing.
+    /// In the mesh's order of vertices [`pack_suns`]; `None` where they tell nothing.
     pub told_suns: Option<Arc<Vec<u32>>>,
 }
 
@@ -195,11 +205,7 @@ impl SurfacePlan {
             }
         };
         let screens: Vec<_> = scene.screens().into_iter().map(|entity| scene.reach(entity)).collect();
-        let crisp = |sun: Disc| {
-            let Disc { toward, half_angle_rad, .. } = sun;
-            (half_angle_rad < CRISP_RAD).then_some(CrispSun { toward, half_angle_rad })
-        };
-        let suns: Vec<CrispSun> = scene.environment.discs().into_iter().filter_map(crisp).take(MOST_SUNS).collect();
+        let suns: Vec<CrispSun> = crisp_suns(scene).map(|(_, sun)| sun).collect();
         let mut plans: Vec<GroupPlan> = Vec::new();
         // The plans of entities alone: those with equal meshes share what is baked.
         let mut alone: HashMap<([u8; 32], [bool; 4], Option<*const Texture>), usize> = HashMap::new();
@@ -244,12 +250,6 @@ impl SurfacePlan {
             plans.push(GroupPlan { volume, ..plan });
         }
         SurfacePlan { groups: plans }
-    }
-
-    /// Unit directions of the suns of which surfaces tell whether they are hidden, in the order of their bits.
-    pub fn suns(&self) -> Vec<DVec3> {
-        let suns = self.groups.iter().map(|group| &group.suns).find(|suns| !suns.is_empty());
-        suns.into_iter().flatten().map(|sun| sun.toward).collect()
     }
 
     /// Names of all that is baked, whatever the suns: another scene with these names can do with the same surfaces.
@@ -556,7 +556,7 @@ impl<'p> Group<'p> {
     }
 }
 
-/// Spheres around the members that a lamp of the group lights from close by, large ones first. `spheres` are those of all
+/// Spheres around the members that a lamp of the group lights from close by. `spheres` are those of all
 /// members.
 fn targets(members: &[Member], spheres: &[(DVec3, f64)]) -> Vec<Target> {
     let lamps = || members.iter().zip(spheres).filter(|(member, _)| member.emits).map(|(_, sphere)| sphere);
@@ -571,9 +571,7 @@ fn targets(members: &[Member], spheres: &[(DVec3, f64)]) -> Vec<Target> {
         let lit = lit(sphere).filter(|_| member.receives && !member.emits)?;
         Some(Target { centre: sphere.0.as_vec3a(), radius: 1.01 * sphere.1 as f32, lit: lit as f32 })
     };
-    let mut targets: Vec<Target> = members.iter().zip(spheres).filter_map(target).collect();
-    targets.sort_by(|a, b| b.radius.total_cmp(&a.radius));
-    targets
+    members.iter().zip(spheres).filter_map(target).collect()
 }
 
 /// A member among its group: sees points of its own frame.
@@ -640,7 +638,7 @@ impl GroupSpace<'_> {
             seen.cover();
         }
         if rays == Rays::Many {
-            [seen.hidden_suns, _] = self.seen_suns(position + nudge, normal);
+            seen.hidden_suns = self.hidden_suns(position + nudge, normal);
         }
         let sees_backs = seen.blocked > BURIED_BLOCKED && seen.behind > BURIED_BACKS * seen.blocked;
         seen.buried = group.plan.refinement.is_some() && (is_covered || sees_backs);
@@ -668,65 +666,46 @@ impl GroupSpace<'_> {
         self.group.place(self.own().placement.point(point.as_dvec3()))
     }
 
-    /// Bits of the group's suns of which a point that faces them sees nothing, and of those of which it sees all. Outlines
+    /// A bit for each of the group's suns of which a point sees nothing, as it faces away or things stand between. Outlines
     /// of what surrounds a point, as those of a house, tell this badly near its walls.
-    fn seen_suns(&self, point: Vec3, normal: Vec3) -> [u32; 2] {
+    fn hidden_suns(&self, point: Vec3, normal: Vec3) -> u32 {
         let origin = self.placed(point);
         let mut hits = Vec::with_capacity(SUN_RAYS.len());
-        let [mut hidden, mut free] = [0, 0];
-        for (number, sun) in self.group.plan.suns.iter().enumerate() {
+        let mut is_hidden = |sun: &CrispSun| {
             if normal.dot(self.local(sun.toward)) <= 0.0 {
-                continue;
+                return true;
             }
             let (x, y) = sun.toward.any_orthonormal_pair();
             let ray = |[a, b]: [f64; 2]| (sun.toward + sun.half_angle_rad * (a * x + b * y)).normalize().as_vec3a();
             hits.clear();
             self.group.blockers.first(origin, &Mat3A::IDENTITY, &SUN_RAYS.map(ray), &self.blocks, &mut hits);
-            hidden |= u32::from(hits.iter().all(Option::is_some)) << number;
-            free |= u32::from(hits.iter().all(Option::is_none)) << number;
-        }
-        [hidden, free]
+            hits.iter().all(Option::is_some)
+        };
+        (0..).zip(&self.group.plan.suns).fold(0, |bits, (number, sun)| bits | u32::from(is_hidden(sun)) << number)
     }
 
-    /// For each triangle, the same of places all over it, as far as they face a sun: those that none of them sees anything
-    /// of, and those that all see all of.
-    fn suns_on_triangles(&self, mesh: &Mesh, nudges: &[Vec3]) -> Vec<[u32; 2]> {
-        let all = (1_u32 << self.group.plan.suns.len()) - 1;
+    /// What every vertex tells of the group's suns, from those that are hidden there; `None` where that is nothing. Those
+    /// that are hidden all around are so from places all over the triangles.
+    fn told_suns(&self, mesh: &Mesh, nudges: &[Vec3], hidden: &[u32]) -> Option<Vec<u32>> {
+        if hidden.iter().all(|hidden| *hidden == 0) {
+            return None;
+        }
         let on = |triangle: &[u32; 3]| {
-            let blend = |of: &dyn Fn(usize) -> Vec3, weights: [f32; 3]| {
-                triangle.iter().zip(weights).map(|(&v, weight)| weight * of(v as usize)).sum::<Vec3>()
+            let hidden_at = |weights: [f32; 3]| {
+                let blend = |of: &dyn Fn(usize) -> Vec3| {
+                    triangle.iter().zip(weights).map(|(&v, weight)| weight * of(v as usize)).sum::<Vec3>()
+                };
+                let off = blend(&|v| nudges[v].dot(mesh.normals[v]) * mesh.normals[v]);
+                self.hidden_suns(blend(&|v| mesh.positions[v]) + off, blend(&|v| mesh.normals[v]))
             };
-            let mut common = [all; 2];
-            for weights in ON_TRIANGLE {
-                let normal = blend(&|v| mesh.normals[v], weights).normalize_or_zero();
-                let off = blend(&|v| nudges[v].dot(mesh.normals[v]) * mesh.normals[v], weights);
-                let point = blend(&|v| mesh.positions[v], weights) + off;
-                let faces = (0..).zip(&self.group.plan.suns);
-                let faces = faces.filter(|(_, sun)| normal.dot(self.local(sun.toward)) > 0.0);
-                let away = all & !faces.fold(0, |bits, (number, _)| bits | 1 << number);
-                let seen = self.seen_suns(point, normal);
-                (0..2).for_each(|k| common[k] &= seen[k] | away);
-            }
-            common
+            ON_TRIANGLE.map(hidden_at).into_iter().fold(u32::MAX, |all, hidden| all & hidden)
         };
-        mesh.triangles.par_iter().map(on).collect()
-    }
-
-    /// What every vertex tells of the group's suns, from those that are hidden there: [`told_suns`].
-    fn told_suns(&self, mesh: &Mesh, nudges: &[Vec3], hidden: &[u32]) -> Vec<u32> {
-        if self.group.plan.suns.is_empty() {
-            return vec![0; hidden.len()];
+        let on_triangles: Vec<u32> = mesh.triangles.par_iter().map(on).collect();
+        let mut around = hidden.to_vec();
+        for (triangle, hidden) in mesh.triangles.iter().zip(on_triangles) {
+            triangle.iter().for_each(|&v| around[v as usize] &= hidden);
         }
-        let mut common = vec![[u32::MAX; 2]; hidden.len()];
-        for (triangle, seen) in mesh.triangles.iter().zip(self.suns_on_triangles(mesh, nudges)) {
-            triangle.iter().for_each(|&v| (0..2).for_each(|k| common[v as usize][k] &= seen[k]));
-        }
-        let all = (1_u32 << self.group.plan.suns.len()) - 1;
-        let told = |(hidden, [dark, free]): (&u32, &[u32; 2])| {
-            let dark = dark & all;
-            told_suns(hidden | dark, dark | (free & all & !hidden))
-        };
-        hidden.iter().zip(&common).map(told).collect()
+        Some(hidden.iter().zip(around).map(|(hidden, around)| pack_suns(*hidden, around)).collect())
     }
 
     /// Whether the way from a point of the member's frame towards a sun is free.
@@ -919,14 +898,14 @@ impl GroupSpace<'_> {
             }
             told(done);
         }
-        let told_suns = self.told_suns(&mesh, nudges, &hidden_suns);
+        let told_suns = self.told_suns(&mesh, nudges, &hidden_suns).map(Arc::new);
         BakedSurface {
             mesh,
             transfer: (any_blocked && wanted.transfer).then(|| Arc::new(transfer)),
             self_visibility: (any_blocked && any_in_map && has_maps).then(|| Arc::new(maps)),
             near,
             links: (!linked.packed.is_empty()).then(|| Arc::new(linked)),
-            told_suns: told_suns.iter().any(|told| *told > 0).then(|| Arc::new(told_suns)),
+            told_suns,
         }
     }
 }

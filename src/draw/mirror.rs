@@ -29,8 +29,9 @@ const COARSEST: u32 = 1 << (LEVELS - 1);
 pub const SPREAD: f64 = 1.6;
 /// The same for probes, as an angle: most of what they show is faced, and a mirrored ray turns by twice a slope.
 pub const PROBE_SPREAD: f64 = 3.2;
-/// Width of the wider of the blurs in `glsl/mirror.glsl`, in slopes.
-pub const WIDER: f64 = 4.26;
+/// Texels beside its place that a pixel may read: filters of the coarsest level reach three quarters so far, and faces that
+/// are not quite flat stick out of their rectangles.
+pub const REACH: u32 = 2 * COARSEST;
 /// Pixels of a picture up to which mirrors may have as many: a mirror takes 60 bytes for each.
 const MOST_FINE_PX: u32 = 1920 * 1200;
 /// Least cosine of the angle between a pixel's normal and the plane's. What this leaves of 1 is how far off the plane a
@@ -48,12 +49,6 @@ pub const PROBE_LEVEL: u32 = 4;
 const PROBE_COARSEST: u32 = 1 << PROBE_LEVEL;
 /// Least width of its pictures, where there is room.
 const LEAST_SIDE: u32 = 64;
-
-/// How far from a pixel's place mirrors are read, in texels, where slopes of microfacets are `slope_px` texels at a distance
-/// of 1. The wider blur reads so many slopes away, by levels whose filters reach three times that far.
-pub fn reach(slope_px: f64) -> u32 {
-    (3.0 * WIDER * slope_px).clamp(2.0, f64::from(3 * COARSEST / 2)).ceil() as u32
-}
 
 /// What may be mirrors in pictures of a scene.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -163,7 +163,6 @@ impl Look<'_> {
             .number("PROBE_SPREAD", mirror::PROBE_SPREAD)
             .define("MIRROR_BINDING", MIRROR_BINDING)
             .number("MIRROR_SPREAD", mirror::SPREAD)
-            .number("MIRROR_WIDER", mirror::WIDER)
             .number("MIRROR_FLAT", mirror::FLAT)
             .define("TEXTURED", detail == Detail::Textured)
     }

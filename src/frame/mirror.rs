@@ -7,7 +7,7 @@ use super::{Frame, gloss};
 use crate::asset::edges::within_picture;
 use crate::asset::mesh::Mesh;
 use crate::bounce::Bounces;
-use crate::draw::mirror::{self, Mirrored, PROBE_ZOOM, finest_side};
+use crate::draw::mirror::{Mirrored, PROBE_ZOOM, REACH, finest_side};
 use crate::draw::triangles::Detail;
 use crate::draw::{DrawnEntity, DrawnViewport, PictureLights};
 use crate::gloss::{PIXEL_ROUGHNESS, brdf};
@@ -39,10 +39,8 @@ const SAME_PLANE: f64 = 1e-3;
 const CLIPPED: f64 = 2.0 * SAME_PLANE;
 /// Share of a mirror's score above the least one at which it is shown whole.
 const FADE: f64 = 0.2;
-/// Slopes of a mirror's microfacets, in texels at a distance of 1, below which shadows in it have edges that are seen,
-/// and the reflectance above which they are.
+/// Slopes of a mirror's microfacets, in texels at a distance of 1, below which shadows in it have edges that are seen.
 const CRISP_PX: f64 = 12.0;
-const CRISP_REFLECTANCE: f64 = 0.1;
 
 /// A flat face of a glossy entity.
 pub(super) struct Face {
@@ -77,8 +75,6 @@ struct Candidate {
     entities: Vec<usize>,
     /// Share of the picture's light that it reflects.
     score: f64,
-    /// Reflectance of what reflects most.
-    reflectance: f64,
     /// Least and largest corner of its faces in a picture that lies between -1 and 1.
     bounds: [DVec2; 2],
 }
@@ -240,18 +236,17 @@ impl Candidate {
     fn join(&mut self, other: Candidate) {
         self.entities.extend(other.entities);
         self.score += other.score;
-        self.reflectance = self.reflectance.max(other.reflectance);
         self.bounds = [self.bounds[0].min(other.bounds[0]), self.bounds[1].max(other.bounds[1])];
     }
 }
 
-/// Left, top, width and height of what lies within bounds of a picture between -1 and 1, and a rim around it, in texels of
+/// Left, top, width and height of what is read where pixels lie within bounds of a picture between -1 and 1, in texels of
 /// one of that size.
-fn texels_within(bounds: [DVec2; 2], size: [u32; 2], rim: u32) -> [u32; 4] {
+fn texels_within(bounds: [DVec2; 2], size: [u32; 2]) -> [u32; 4] {
     let ends = |axis: usize| {
         let at = bounds.map(|corner| 0.5 * (corner[axis] + 1.0) * f64::from(size[axis]));
-        let first = (at[0].floor() as u32).saturating_sub(rim);
-        [first, (at[1].ceil() as u32 + rim).min(size[axis]).saturating_sub(first)]
+        let first = (at[0].floor() as u32).saturating_sub(REACH);
+        [first, (at[1].ceil() as u32 + REACH).min(size[axis]).saturating_sub(first)]
     };
     let [left, width] = ends(0);
     let [top, height] = ends(1);
@@ -281,12 +276,10 @@ impl Frame {
                 continue;
             }
             let flat = within(seen.clip_from_world, corners);
-            let reflectance = self.reflectance(face.entity, height_m / distance_m);
             let candidate = Candidate {
                 place: Place::Plane(plane),
                 entities: vec![face.entity],
-                score: reflectance * share_of_picture(&flat),
-                reflectance,
+                score: self.reflectance(face.entity, height_m / distance_m) * share_of_picture(&flat),
                 bounds: [
                     flat.iter().copied().fold(DVec2::INFINITY, DVec2::min),
                     flat.iter().copied().fold(DVec2::NEG_INFINITY, DVec2::max),
@@ -313,12 +306,10 @@ impl Frame {
             let (x, y) = toward.any_orthonormal_pair();
             let [x, y] = [x, y].map(|axis| SEEN_RADIUS * radius_m * axis);
             let corners = [centre - x - y, centre + x - y, centre + x + y, centre - x + y];
-            let reflectance = self.reflectance(*entity, 0.5);
             found.push(Candidate {
                 place: Place::Ball(centre, radius_m),
                 entities: vec![*entity],
-                score: reflectance * share_of_picture(&within(seen.clip_from_world, corners)),
-                reflectance,
+                score: self.reflectance(*entity, 0.5) * share_of_picture(&within(seen.clip_from_world, corners)),
                 bounds: [-DVec2::ONE, DVec2::ONE],
             });
         }
@@ -333,14 +324,13 @@ impl Frame {
         // None comes or goes in a step.
         let least = found.get(mirrors.count()).map_or(0.0, |candidate| candidate.score).max(LEAST_SHARE);
         let shown = found.into_iter().filter(|candidate| candidate.score > least).take(mirrors.count());
-        let mirror = |Candidate { place, entities, score, reflectance, bounds }: Candidate| {
+        let mirror = |Candidate { place, entities, score, bounds }: Candidate| {
             let roughness = |entity: &usize| self.scene.entities[*entity].gloss.map_or(0.0, |gloss| gloss.roughness);
-            let alphas = || entities.iter().map(|entity| f64::from(roughness(entity)).powi(2));
-            let least_px = focal_px * alphas().fold(f64::INFINITY, f64::min);
+            let alphas = entities.iter().map(|entity| f64::from(roughness(entity)).powi(2));
+            let least_px = focal_px * alphas.fold(f64::INFINITY, f64::min);
             let shape = match place {
                 Place::Plane(plane) => {
-                    let rim = mirror::reach(focal_px * alphas().fold(0.0, f64::max));
-                    Shape::Plane(Plane::new(&seen, plane, mirrors.part, texels_within(bounds, mirrors.part, rim)))
+                    Shape::Plane(Plane::new(&seen, plane, mirrors.part, texels_within(bounds, mirrors.part)))
                 }
                 Place::Ball(centre, radius_m) => {
                     // As wide as it is seen, and no finer than its blur.
@@ -350,12 +340,7 @@ impl Frame {
                     Shape::Probe(Box::new(Probe::new(centre, radius_m, side)))
                 }
             };
-            Mirror {
-                shape,
-                share: ((score / least - 1.0) / FADE).min(1.0),
-                crisp: least_px < CRISP_PX && reflectance > CRISP_REFLECTANCE,
-                entities,
-            }
+            Mirror { shape, share: ((score / least - 1.0) / FADE).min(1.0), crisp: least_px < CRISP_PX, entities }
         };
         shown.map(mirror).collect()
     }

@@ -28,7 +28,7 @@ mod viewport;
 
 use crate::bake::cache::Cache;
 use crate::bake::ensure::SceneProgress;
-use crate::bake::surfaces::SurfacePlan;
+use crate::bake::surfaces::{SurfacePlan, crisp_suns};
 use crate::bake::{self, Baker, SceneNeeds};
 use crate::bounce::{Bounce, BounceWork, Bounces, Linked, LinkedEntity};
 use crate::draw::Shading;
@@ -78,8 +78,11 @@ pub struct Frame {
     scene: Scene,
     /// Which entities never move against each other.
     groups: Groups,
-    /// Whether all that occludes rests and is opaque, so that rays from where it stands know all of it.
-    is_still: bool,
+    /// Entities of the suns of which vertices tell whether they are hidden, in the order of their bits, and where they
+    /// stood.
+    told_suns: Vec<(usize, Placement)>,
+    /// What occludes and rested when that was baked, and where.
+    stood: Vec<(usize, Placement)>,
     /// How far the rectangles that entities are reach into boxes; see [`seams::reaches`].
     reaches: Vec<[f64; 2]>,
     /// What the own visibility of the vertices was baked for.
@@ -222,10 +225,14 @@ impl Frame {
         Ok(Frame {
             device: device.clone(),
             library: library.clone(),
-            is_still: (0..scene.entities.len()).all(|entity| {
-                let of = &scene.entities[entity];
-                !of.occludes || (scene.is_at_rest(entity) && !of.transparent && of.opacity >= 1.0)
-            }),
+            told_suns: crisp_suns(&scene)
+                .map(|(place, _)| scene.data.entities.len() + place)
+                .map(|sun| (sun, placements[sun]))
+                .collect(),
+            stood: (0..scene.data.entities.len())
+                .filter(|&entity| scene.entities[entity].occludes && scene.is_at_rest(entity))
+                .map(|entity| (entity, placements[entity]))
+                .collect(),
             reaches: seams::reaches(&scene, &placements),
             scene,
             groups: needs.groups,

@@ -14,10 +14,8 @@ use crate::scene::{LightMethod, Placement};
 use crate::scene_buffers::{self, FieldSlot, Slot};
 use crate::sh::rotation::turns;
 use glam::DVec3;
+use std::collections::HashMap;
 use std::f64::consts::PI;
-
-/// Distance of unit vectors to suns that are one.
-const SAME_SUN: f64 = 1e-6;
 
 impl Frame {
     /// All that lists and merge depend on at this time.
@@ -27,7 +25,11 @@ impl Frame {
         let bounds = of_entities().map(|(index, p)| self.entity_bounds(index, p));
         let bounds: Vec<EntityBounds> =
             bounds.chain(of_boxes().map(|(entity, number, p)| self.box_bounds(entity, number, p))).collect();
-        let entities = of_entities().map(|(index, p)| self.entity(index, p));
+        let sun_bits = self.sun_bits(placements);
+        let entities = of_entities().map(|(index, p)| layout::DeviceEntity {
+            sun_bit: sun_bits.get(&index).copied().unwrap_or(0),
+            ..self.entity(index, p)
+        });
         let entities = entities.chain(of_boxes().map(|(entity, number, p)| self.box_entity(entity, number, p)));
         let white = f64::from(self.scene.data.output.white());
         let sky = (!self.scene.environment.is_none()).then_some(self.sky.brightest);
@@ -124,12 +126,15 @@ impl Frame {
         }
     }
 
-    /// The bit of a sun among those that vertices tell hidden; 0 of what is none, and of one that has moved since.
-    pub(super) fn sun_bit(&self, index: usize, placement: &Placement) -> u32 {
-        let is_sun = index >= self.scene.data.entities.len() && index < self.scene.entities.len();
-        let toward = placement.position.as_dvec3().normalize_or_zero();
-        let suns = self.buffers.suns.iter().filter(|_| is_sun);
-        suns.zip(0..).find(|(sun, _)| sun.distance(toward) < SAME_SUN).map_or(0, |(_, bit)| 1 << bit)
+    /// Of each sun that stands where it stood when that was baked, its bit among those that vertices tell hidden; none where
+    /// something that rested has moved.
+    pub(super) fn sun_bits(&self, placements: &[Placement]) -> HashMap<usize, u32> {
+        let stands = |(entity, stood): &(usize, Placement)| placements[*entity] == *stood;
+        if !self.stood.iter().all(stands) {
+            return HashMap::new();
+        }
+        let suns = self.told_suns.iter().enumerate().filter(|(_, sun)| stands(sun));
+        suns.map(|(bit, (sun, _))| (*sun, 1 << bit)).collect()
     }
 
     fn entity(&self, index: usize, placement: &Placement) -> layout::DeviceEntity {
@@ -192,8 +197,6 @@ impl Frame {
             blocked_base: device_mesh.blocked.as_ref().map_or(0, FieldSlot::quad),
             radiance_base,
             irradiance_first: self.radiosity.irradiance_first(index).unwrap_or(NONE),
-            sun_bit: self.sun_bit(index, placement),
-            free_bit: if self.is_still { self.sun_bit(index, placement) } else { 0 },
             ..layout::DeviceEntity::default()
         }
     }

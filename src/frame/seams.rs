@@ -36,6 +36,7 @@ pub(super) fn reaches(scene: &Scene, placements: &[Placement]) -> Vec<[f64; 2]> 
         let centre = mesh.bounding_sphere().0.as_dvec3();
         let in_a_box = |place: DVec3, gap_m: f64| {
             let world = placements[entity].point(place);
+            let gap_m = gap_m * f64::from(placements[entity].scale);
             boxes.iter().any(|(of, own)| holds(own, of.local(world), gap_m / f64::from(of.scale)))
         };
         for axis in 0..2 {
@@ -47,13 +48,16 @@ pub(super) fn reaches(scene: &Scene, placements: &[Placement]) -> Vec<[f64; 2]> 
 
 fn reach(rectangle: &Rectangle, centre: DVec3, axis: usize, in_a_box: &dyn Fn(DVec3, f64) -> bool) -> f64 {
     let Rectangle { axes, half_m } = rectangle;
+    let at = |end: f64, number: usize| {
+        let along = 0.98 * (2.0 * number as f64 / (PLACES - 1) as f64 - 1.0);
+        let place = centre + end * half_m[axis] * axes[axis] + along * half_m[1 - axis] * axes[1 - axis];
+        in_a_box(place, GAP * half_m[axis])
+    };
     let fits = |reach: &f64| {
-        let out = (1.0 + reach) * half_m[axis];
-        let place = |end: f64, at: usize| {
-            let along = 0.98 * (2.0 * at as f64 / (PLACES - 1) as f64 - 1.0);
-            centre + end * out * axes[axis] + along * half_m[1 - axis] * axes[1 - axis]
-        };
-        [-1.0, 1.0].iter().all(|end| (0..PLACES).all(|at| in_a_box(place(*end, at), GAP * half_m[axis])))
+        let ends = [-1.0, 1.0].into_iter().flat_map(|end| (0..PLACES).map(move |number| (end, number)));
+        // A rug lies on a box with all of itself.
+        ends.clone().all(|(end, number)| at((1.0 + reach) * end, number))
+            && !ends.clone().any(|(end, number)| at((1.0 - reach) * end, number))
     };
     REACHES.into_iter().find(fits).map_or(0.0, |reach| reach * half_m[axis])
 }
@@ -97,5 +101,11 @@ mod tests {
             assert!((reach - wanted).abs() < 1e-9, "{axis} {reach}");
         }
         assert!(found[1..].iter().all(|reach| *reach == [0.0; 2]));
+        let rug = "[camera]\neye = [0, 1, 0]\ntarget = [1, 1, 0]\n[[mesh]]\nname = \"rug\"\n\
+                   plane = { size_m = 4.0, cells = 1 }\n[[entity]]\nmesh = \"rug\"\n"
+            .to_owned()
+            + &wall("floor", [0.0, -0.1, 0.0], [9.0, 0.2, 9.0]);
+        let scene = Scene::parse(&rug, Path::new("s.toml"), &read).unwrap();
+        assert_eq!(reaches(&scene, &scene.at(0.0))[0], [0.0; 2]);
     }
 }

@@ -6,7 +6,7 @@ use crate::error::Result;
 use crate::field::cuboid::PlacedCuboid;
 use crate::field::{Area, ShadowField, self_visibility};
 use crate::gpu::Buffer;
-use crate::layout::{CLUSTER_VERTICES, Cluster, ENTRY_ENTITIES, ListEntry, MOST_SUNS};
+use crate::layout::{CLUSTER_VERTICES, Cluster, ENTRY_ENTITIES, ListEntry};
 use crate::lists::gather::Globe;
 use crate::merge::twin::{MergeObject, MergeTwin};
 use crate::scene::{LightMethod, Placement};
@@ -250,6 +250,7 @@ impl FrameTwin<'_> {
         };
         let points: Vec<SurfacePoint> = receiver.positions.iter().zip(&receiver.normals).map(point).collect();
         let told_suns = &self.frame.buffers.surface(receiver.index).told_suns;
+        let sun_bits = self.frame.sun_bits(self.placements);
         let twin = SharpTwin {
             objects: outlines,
             occluders: &occluders,
@@ -257,11 +258,9 @@ impl FrameTwin<'_> {
             self_maps: self_maps.as_deref().map(|maps| &maps[..]),
             lights: &lights,
             leaves: &|v, j, light| leaves(v, j, Some(light)),
-            sees: &|v, light| {
+            is_hidden: &|v, light| {
                 let told = told_suns.as_ref().map_or(0, |told| told[v]);
-                let bit = self.frame.sun_bit(light, &self.placements[light]);
-                let is_free = told >> MOST_SUNS & !told & bit != 0 && self.frame.is_still;
-                if told & bit != 0 { Some(false) } else { is_free.then_some(true) }
+                told & sun_bits.get(&light).copied().unwrap_or(0) != 0
             },
             encloses: &|v, j, light| {
                 let is_around = |globe: &&Globe| [globe.occluder, globe.light] == [j as u32, light as u32];

@@ -52,13 +52,14 @@ pub struct Shader {
 
 impl Shader {
     /// Compiles `source`, or reads the words from `cache_dir` if the same source, includes and defines were compiled by
-    /// the same compiler before. What this process has compiled it keeps: one bake after another asks for the same.
+    /// the same compiler before. Without a folder the process keeps what it compiles: one bake after another asks for the
+    /// same.
     pub fn compile(source: &ShaderSource<'_>, cache_dir: Option<&Path>) -> Result<Self> {
         static COMPILED: Mutex<BTreeMap<String, Shader>> = Mutex::new(BTreeMap::new());
         let compiled = || COMPILED.lock().unwrap_or_else(PoisonError::into_inner);
         let includes = gather(source.name, &source.text, source.include)?;
         let key = key(source, &includes);
-        if let Some(shader) = compiled().get(&key) {
+        if let Some(shader) = compiled().get(&key).filter(|_| cache_dir.is_none()) {
             return Ok(shader.clone());
         }
         let path = cache_dir.map(|folder| folder.join("spirv").join(format!("{key}.spv")));
@@ -82,7 +83,9 @@ impl Shader {
             log::warn!("{}: the compiled shader was not saved: {error}", path.display());
         }
         let shader = shader(spirv)?;
-        compiled().insert(key, shader.clone());
+        if cache_dir.is_none() {
+            compiled().insert(key, shader.clone());
+        }
         Ok(shader)
     }
 }

@@ -85,8 +85,6 @@ pub struct SceneBuffers {
     pub volume: Option<Arc<SceneVolume>>,
     /// Where it begins among the fields, in units of [`ALIGNMENT`].
     volume_first: u32,
-    /// Unit directions of the suns of which surfaces tell whether they are hidden, in the order of their bits.
-    pub suns: Vec<DVec3>,
     pub surfaces: Vec<DeviceSurface>,
     /// The scene's textures; those that are equal are shared.
     pub textures: Vec<Arc<Texture>>,
@@ -100,7 +98,7 @@ pub struct SceneBuffers {
 /// Vertices and their own visibility on their way into the buffers of a scene.
 struct Packing {
     /// Two quads a vertex: its position about the centre of the mesh's bounding sphere and how far its farthest
-    /// neighbour is, metres; and its normal, and what it tells of suns ([`crate::layout::told_suns`]), as a number.
+    /// neighbour is, metres; and its normal, and what it tells of suns ([`crate::layout::pack_suns`]), as a number.
     vertices: Vec<[f32; 4]>,
     transfers: Vec<f32>,
     self_cells: Vec<[u32; 2]>,
@@ -201,7 +199,6 @@ impl SceneBuffers {
             meshes,
             volume: baked.volume.map(Arc::new),
             volume_first,
-            suns: baked.suns,
             surfaces,
             textures: textures::upload(device, &scene.textures, |index| {
                 let is_number = |maps: MapIndices| maps.gloss == Some(index) || maps.normal == Some(index);

@@ -451,7 +451,7 @@ fn a_closed_room_in_the_sun_is_dark() {
     let options = frame::Options { size: [96, 64], bake, ..frame::Options::default() };
     let shown = gpu.picture(&scene, options, f32::INFINITY);
     let mean = shown.iter().sum::<f32>() / shown.len() as f32;
-    assert!(mean < 2e-4, "{mean}");
+    assert!(mean < 5e-4, "{mean}");
 }
 
 /// The sun falls through a hole in a cave onto a pool, which is a grid: before the cave, which is around the pool, its

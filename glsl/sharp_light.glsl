@@ -32,7 +32,7 @@ void set_block(inout vec4 all[BLOCKS], uint b, vec4 value) {
 #define set_block(all, b, value) all[b] = value
 #endif
 
-#if SHOWN || PANELS
+#if SHOWN || PANELS || HIDES
 float open_share; // irradiance by the current light's parts with nothing between, of radiance 1
 #endif
 
@@ -340,13 +340,13 @@ vec4 part_shares(Surface surface, SeenLight light, Block block) {
 #if SELF && FACINGS > 1
         vec2 counted = vec2(0.0); // of the facings that count: past their self-visibility, and without
 #endif
-#if SHOWN || PANELS
+#if SHOWN || PANELS || HIDES
         float open = 0.0;
 #endif
         EACH for (uint i = 0; i < FACINGS; i++) {
             Facing facing = surface.facings[i];
             float cosine = part_cosine(dot(facing.normal, direction), sine);
-#if SHOWN || PANELS
+#if SHOWN || PANELS || HIDES
             open += facing.weight * cosine;
 #endif
 #if SELF
@@ -380,7 +380,7 @@ vec4 part_shares(Surface surface, SeenLight light, Block block) {
         float steps = surface.step / max(reach, 1e-30);
         curved += share[k] * min(steps * steps, 1.0);
 #endif
-#if SHOWN || PANELS
+#if SHOWN || PANELS || HIDES
         open_share += unit * open;
 #endif
     }
@@ -513,7 +513,7 @@ vec3 chain_sum(Surface surface, uint i, uint end) {
 #endif
     uint first_block = light.fine >= 1.0 ? 1 : 0, last_block = light.fine <= 0.0 ? 0 : 4;
     vec4 shares[BLOCKS]; // irradiance by the parts of each block
-#if SHOWN || PANELS
+#if SHOWN || PANELS || HIDES
     open_share = 0.0;
 #endif
 #if EDGES
@@ -663,19 +663,30 @@ vec3 chain_sum(Surface surface, uint i, uint end) {
     find_rim(ramp, shining, surface.step / max(light.distance, 1e-30));
     float miss = add_open(unblocked, cone, shining);
 #endif
+#if KEEPS
+    bool dark = passed <= 0.001 * unblocked && unblocked > 0.0;
 #if HIDES
-    // Pixels around the vertex may still see some of that sun.
-    irradiance = is_hidden ? 0.0 : irradiance;
+    dark = dark || is_hidden;
+#endif
+    float kept_irradiance = irradiance;
+#endif
+#if HIDES
+    // What rays know; what is kept is for pixels around the vertex, by outlines as they evaluate it.
+    bool is_free = (told_suns >> (2 * MOST_SUNS) & shining.free_bit) != 0;
+    irradiance = is_hidden ? 0.0 : is_free ? shines * open_share : irradiance;
 #endif
 #if SHOWN
     note_share(chain_light(entry_at(end)), irradiance * cone);
 #endif
 #if PANELS
-    irradiance *= over_parts(surface, light);
+    float over = over_parts(surface, light);
+    irradiance *= over;
+#if KEEPS
+    kept_irradiance *= over;
+#endif
 #endif
 #if KEEPS
-    bool dark = is_hidden || (passed <= 0.001 * unblocked && unblocked > 0.0);
-    keep(shining, dark ? 0.0 : max(irradiance * cone, LEAST_KEPT), miss);
+    keep(shining, dark ? 0.0 : max(kept_irradiance * cone, LEAST_KEPT), miss);
 #endif
 #if LAMPS
     lamps += irradiance / PI;

@@ -113,18 +113,18 @@ shared_struct! {
         light_thin: f32,
         /// Of a sun: its bit among those that a vertex tells hidden, see [`pack_suns`]; 0 of any other light.
         sun_bit: u32,
-        /// Texels hold a multiple of four words.
-        unused: f32,
+        /// The same where nothing moves or lets light through that may hide a sun of which a vertex sees all.
+        free_bit: u32,
     }
 }
 
 /// The most suns of which vertices tell whether they are hidden.
-pub const MOST_SUNS: usize = 12;
+pub const MOST_SUNS: usize = 8;
 
-/// A vertex tells of each sun whether it is hidden, a bit each, and [`MOST_SUNS`] bits on whether it is on all triangles
-/// around. A float holds all of them.
-pub fn pack_suns(hidden: u32, around: u32) -> u32 {
-    hidden | around << MOST_SUNS
+/// A vertex tells of each sun whether it is hidden, whether it is on all triangles around, and whether all of it is seen.
+/// A float holds all bits.
+pub fn pack_suns(hidden: u32, around: u32, free: u32) -> u32 {
+    hidden | around << MOST_SUNS | free << (2 * MOST_SUNS)
 }
 
 impl DeviceEntity {

@@ -252,8 +252,9 @@ pub struct Seen {
     pub buried: bool,
     /// Fronts that the rays met, of [`Rays::Many`] alone.
     pub fronts: Vec<Front>,
-    /// A bit for each of the group's suns of which nothing can be seen, of [`Rays::Many`] alone; [`see`] leaves it 0.
-    pub hidden_suns: u32,
+    /// A bit for each of the group's suns of which nothing can be seen, and all, of [`Rays::Many`] alone; [`see`] leaves
+    /// them 0.
+    pub suns: [u32; 2],
 }
 
 #[derive(Clone, Copy, Debug)]

@@ -358,6 +358,7 @@ pub(super) fn refine(
     }
     let share = (limits.vertices - start) / 2;
     for (refined, space, flat) in surfaces.iter_mut() {
+        refined.part(space);
         let most = if *flat { limits.flat_edge } else { limits.edge };
         let budget = refined.positions.len() + share;
         refined.cut_longest(most / space.scale(), budget);
@@ -366,7 +367,6 @@ pub(super) fn refine(
         let budget = vertex_count(surfaces) + (limits.vertices - start) / SUNS_SHARE;
         follow_suns(surfaces, suns, limits, budget);
     }
-    surfaces.iter_mut().for_each(|(refined, space, _)| refined.part(space));
     let area: f32 = surfaces.iter().map(|(refined, space, _)| refined.area() * space.scale().powi(2)).sum();
     loop {
         let before = vertex_count(surfaces);

@@ -30,7 +30,7 @@ use std::sync::{Arc, OnceLock};
 use std::time::Instant;
 
 /// Counts in every name of the cache: another number where a bake of surfaces computes something else.
-const VERSION: u32 = 42;
+const VERSION: u32 = 44;
 /// How far towards the middle of its triangles a vertex is seen from, as a share of the way: the light of a crease is
 /// that just inside each face. Where meshes are left as they are, so are the places from which they are seen.
 const NUDGE: f32 = 0.02;
@@ -638,7 +638,7 @@ impl GroupSpace<'_> {
             seen.cover();
         }
         if rays == Rays::Many {
-            seen.hidden_suns = self.hidden_suns(position + nudge, normal);
+            seen.suns = self.seen_suns(position + nudge, normal);
         }
         let sees_backs = seen.blocked > BURIED_BLOCKED && seen.behind > BURIED_BACKS * seen.blocked;
         seen.buried = group.plan.refinement.is_some() && (is_covered || sees_backs);
@@ -666,28 +666,33 @@ impl GroupSpace<'_> {
         self.group.place(self.own().placement.point(point.as_dvec3()))
     }
 
-    /// A bit for each of the group's suns of which a point sees nothing, as it faces away or things stand between. Outlines
-    /// of what surrounds a point, as those of a house, tell this badly near its walls.
-    fn hidden_suns(&self, point: Vec3, normal: Vec3) -> u32 {
+    /// A bit for each of the group's suns of which a point sees nothing, as it faces away or things stand between, and for
+    /// each of which it sees all. Outlines of what surrounds a point, as those of a house, tell this badly near its walls.
+    fn seen_suns(&self, point: Vec3, normal: Vec3) -> [u32; 2] {
         let origin = self.placed(point);
         let mut hits = Vec::with_capacity(SUN_RAYS.len());
-        let mut is_hidden = |sun: &CrispSun| {
+        let mut sees = |sun: &CrispSun| {
             if normal.dot(self.local(sun.toward)) <= 0.0 {
-                return true;
+                return [true, false];
             }
             let (x, y) = sun.toward.any_orthonormal_pair();
             let ray = |[a, b]: [f64; 2]| (sun.toward + sun.half_angle_rad * (a * x + b * y)).normalize().as_vec3a();
             hits.clear();
             self.group.blockers.first(origin, &Mat3A::IDENTITY, &SUN_RAYS.map(ray), &self.blocks, &mut hits);
-            hits.iter().all(Option::is_some)
+            [hits.iter().all(Option::is_some), hits.iter().all(Option::is_none)]
         };
-        (0..).zip(&self.group.plan.suns).fold(0, |bits, (number, sun)| bits | u32::from(is_hidden(sun)) << number)
+        let mut bits = [0; 2];
+        for (number, sun) in self.group.plan.suns.iter().enumerate() {
+            let seen = sees(sun);
+            (0..2).for_each(|k| bits[k] |= u32::from(seen[k]) << number);
+        }
+        bits
     }
 
-    /// What every vertex tells of the group's suns, from those that are hidden there; `None` where that is nothing. Those
-    /// that are hidden all around are so from places all over the triangles.
-    fn told_suns(&self, mesh: &Mesh, nudges: &[Vec3], hidden: &[u32]) -> Option<Vec<u32>> {
-        if hidden.iter().all(|hidden| *hidden == 0) {
+    /// What every vertex tells of the group's suns, from those that it sees nothing of, and all; `None` where that is
+    /// nothing. Those that are hidden all around are so from places all over the triangles.
+    fn told_suns(&self, mesh: &Mesh, nudges: &[Vec3], seen: &[[u32; 2]]) -> Option<Vec<u32>> {
+        if seen.iter().all(|bits| *bits == [0; 2]) {
             return None;
         }
         let on = |triangle: &[u32; 3]| {
@@ -696,16 +701,16 @@ impl GroupSpace<'_> {
                     triangle.iter().zip(weights).map(|(&v, weight)| weight * of(v as usize)).sum::<Vec3>()
                 };
                 let off = blend(&|v| nudges[v].dot(mesh.normals[v]) * mesh.normals[v]);
-                self.hidden_suns(blend(&|v| mesh.positions[v]) + off, blend(&|v| mesh.normals[v]))
+                self.seen_suns(blend(&|v| mesh.positions[v]) + off, blend(&|v| mesh.normals[v]))[0]
             };
             ON_TRIANGLE.map(hidden_at).into_iter().fold(u32::MAX, |all, hidden| all & hidden)
         };
         let on_triangles: Vec<u32> = mesh.triangles.par_iter().map(on).collect();
-        let mut around = hidden.to_vec();
+        let mut around: Vec<u32> = seen.iter().map(|[hidden, _]| *hidden).collect();
         for (triangle, hidden) in mesh.triangles.iter().zip(on_triangles) {
             triangle.iter().for_each(|&v| around[v as usize] &= hidden);
         }
-        Some(hidden.iter().zip(around).map(|(hidden, around)| pack_suns(*hidden, around)).collect())
+        Some(seen.iter().zip(around).map(|([hidden, free], around)| pack_suns(*hidden, around, *free)).collect())
     }
 
     /// Whether the way from a point of the member's frame towards a sun is free.
@@ -812,7 +817,7 @@ impl GroupSpace<'_> {
         let has_maps = wanted.self_visibility && (members_around.contains(&true) || !is_grid());
         let mut maps = vec![0; if has_maps { mesh.positions.len() * BYTES } else { 0 }];
         let mut near = Vec::with_capacity(order.len().div_ceil(CLUSTER_VERTICES as usize));
-        let mut hidden_suns = vec![0; mesh.positions.len()];
+        let mut suns = vec![[0; 2]; mesh.positions.len()];
         let mut any_blocked = false;
         let mut any_in_map = false;
         let mut linked = Links::default();
@@ -885,7 +890,7 @@ impl GroupSpace<'_> {
                     if !plan.screens.is_empty() {
                         linked.directions.extend(links.iter().map(|link| link.direction));
                     }
-                    hidden_suns[v as usize] = seen.hidden_suns;
+                    suns[v as usize] = seen.suns;
                     any_blocked |= seen.blocked > 0.0;
                     transfer[v as usize * stride..][..stride].copy_from_slice(&seen.transfer);
                     if has_maps {
@@ -898,7 +903,7 @@ impl GroupSpace<'_> {
             }
             told(done);
         }
-        let told_suns = self.told_suns(&mesh, nudges, &hidden_suns).map(Arc::new);
+        let told_suns = self.told_suns(&mesh, nudges, &suns).map(Arc::new);
         BakedSurface {
             mesh,
             transfer: (any_blocked && wanted.transfer).then(|| Arc::new(transfer)),

@@ -29,8 +29,6 @@ const LEAST_FACE: f64 = 0.04;
 const MOST_FACES: usize = 8;
 /// A mesh with less than this share of its surface in flat faces is curved.
 const FLAT_MESH: f64 = 0.5;
-/// Share of a curved surface's bounding radius within which all that lies is part of it, as the inside of a lamp shade.
-const WITHIN_PROBE: f64 = 1.05;
 /// Half of the edge of a square that covers as much of a picture as what is curved, in bounding radii.
 const SEEN_RADIUS: f64 = 0.7;
 /// Faces whose normals and offsets, over the eye's distance from the plane, differ by less are one mirror.
@@ -348,7 +346,7 @@ impl Frame {
     /// Whether an entity is to be seen in a probe: neither what has it nor what is within that.
     fn is_around(&self, probe: &Probe, of: &HashSet<usize>, entity: usize, placement: &Placement) -> bool {
         let inside = self.centre(entity, placement).distance(probe.centre) + self.radius_m(entity, placement);
-        !of.contains(&entity) && inside > WITHIN_PROBE * probe.radius_m
+        !of.contains(&entity) && inside > probe.radius_m
     }
 
     /// What an entity reflects of white light where it is seen at a cosine.

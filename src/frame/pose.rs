@@ -26,9 +26,9 @@ impl Frame {
         let bounds: Vec<EntityBounds> =
             bounds.chain(of_boxes().map(|(entity, number, p)| self.box_bounds(entity, number, p))).collect();
         let sun_bits = self.sun_bits(placements);
-        let entities = of_entities().map(|(index, p)| layout::DeviceEntity {
-            sun_bit: sun_bits.get(&index).copied().unwrap_or(0),
-            ..self.entity(index, p)
+        let entities = of_entities().map(|(index, p)| {
+            let [sun_bit, free_bit] = sun_bits.get(&index).copied().unwrap_or_default();
+            layout::DeviceEntity { sun_bit, free_bit, ..self.entity(index, p) }
         });
         let entities = entities.chain(of_boxes().map(|(entity, number, p)| self.box_entity(entity, number, p)));
         let white = f64::from(self.scene.data.output.white());
@@ -126,15 +126,21 @@ impl Frame {
         }
     }
 
-    /// Of each sun that stands where it stood when that was baked, its bit among those that vertices tell hidden; none where
-    /// something that rested has moved.
-    pub(super) fn sun_bits(&self, placements: &[Placement]) -> HashMap<usize, u32> {
+    /// Of each sun that stands where it stood when that was baked, its bit among those that vertices tell hidden, and where
+    /// all that occludes is known also among those that they tell seen; none where something that rested has moved.
+    pub(super) fn sun_bits(&self, placements: &[Placement]) -> HashMap<usize, [u32; 2]> {
         let stands = |(entity, stood): &(usize, Placement)| placements[*entity] == *stood;
         if !self.stood.iter().all(stands) {
             return HashMap::new();
         }
+        let blocks = |entity: &usize| self.scene.entities[*entity].occludes;
+        let is_solid = |entity: usize| {
+            let of = &self.scene.entities[entity];
+            self.scene.is_at_rest(entity) && !of.transparent && of.opacity >= 1.0
+        };
+        let is_known = (0..self.scene.entities.len()).filter(blocks).all(is_solid);
         let suns = self.told_suns.iter().enumerate().filter(|(_, sun)| stands(sun));
-        suns.map(|(bit, (sun, _))| (*sun, 1 << bit)).collect()
+        suns.map(|(place, (sun, _))| (*sun, [1 << place, u32::from(is_known) << place])).collect()
     }
 
     fn entity(&self, index: usize, placement: &Placement) -> layout::DeviceEntity {

@@ -6,7 +6,7 @@ use crate::error::Result;
 use crate::field::cuboid::PlacedCuboid;
 use crate::field::{Area, ShadowField, self_visibility};
 use crate::gpu::Buffer;
-use crate::layout::{CLUSTER_VERTICES, Cluster, ENTRY_ENTITIES, ListEntry};
+use crate::layout::{CLUSTER_VERTICES, Cluster, ENTRY_ENTITIES, ListEntry, MOST_SUNS};
 use crate::lists::gather::Globe;
 use crate::merge::twin::{MergeObject, MergeTwin};
 use crate::scene::{LightMethod, Placement};
@@ -258,9 +258,11 @@ impl FrameTwin<'_> {
             self_maps: self_maps.as_deref().map(|maps| &maps[..]),
             lights: &lights,
             leaves: &|v, j, light| leaves(v, j, Some(light)),
-            is_hidden: &|v, light| {
+            sees: &|v, light| {
                 let told = told_suns.as_ref().map_or(0, |told| told[v]);
-                told & sun_bits.get(&light).copied().unwrap_or(0) != 0
+                let [sun_bit, free_bit] = sun_bits.get(&light).copied().unwrap_or_default();
+                let is_free = told >> (2 * MOST_SUNS) & free_bit != 0;
+                if told & sun_bit != 0 { Some(false) } else { is_free.then_some(true) }
             },
             encloses: &|v, j, light| {
                 let is_around = |globe: &&Globe| [globe.occluder, globe.light] == [j as u32, light as u32];

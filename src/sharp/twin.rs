@@ -53,8 +53,8 @@ pub struct SharpTwin<'t> {
     pub lights: &'t [SharpLight<'t>],
     /// Whether a vertex leaves out an occluder before a light, or the light itself where both are the same.
     pub leaves: &'t (dyn Fn(usize, usize, usize) -> bool + Sync),
-    /// Whether a vertex is known to see nothing of a light.
-    pub is_hidden: &'t (dyn Fn(usize, usize) -> bool + Sync),
+    /// Whether a vertex is known to see all of a light, or nothing; `None` where occluders decide.
+    pub sees: &'t (dyn Fn(usize, usize) -> Option<bool> + Sync),
     /// Whether, to a vertex, an occluder is a globe around a light.
     pub encloses: &'t (dyn Fn(usize, usize, usize) -> bool + Sync),
 }
@@ -81,7 +81,7 @@ impl SharpTwin<'_> {
         };
         let lit = |light: &SharpLight<'_>| light.emission * cone(light) * self.irradiance(v, point, light) / PI;
         let shines = |light: &&SharpLight<'_>| {
-            !(self.leaves)(v, light.entity, light.entity) && !(self.is_hidden)(v, light.entity)
+            !(self.leaves)(v, light.entity, light.entity) && (self.sees)(v, light.entity) != Some(false)
         };
         self.lights.iter().filter(shines).map(lit).sum()
     }
@@ -103,7 +103,8 @@ impl SharpTwin<'_> {
             }
             LightMethod::Harmonics => return DVec3::ZERO,
         };
-        let between = |j: &&usize| **j != light.entity && !(self.leaves)(v, **j, light.entity);
+        let is_free = (self.sees)(v, light.entity) == Some(true);
+        let between = |j: &&usize| !is_free && **j != light.entity && !(self.leaves)(v, **j, light.entity);
         let (globes, between): (Vec<usize>, Vec<usize>) =
             self.occluders.iter().filter(between).partition(|j| (self.encloses)(v, **j, light.entity));
         let past_globes: f64 = globes.iter().map(|&j| 1.0 - self.objects[j].opacity).product();
@@ -158,7 +159,7 @@ impl SharpTwin<'_> {
                 });
                 let covers =
                     share.unwrap_or(0.0) + own.as_ref().map_or(0.0, |near| blocked(shining, near, part, f64::INFINITY));
-                let sees = self.self_maps.map_or(1.0, |maps| {
+                let sees = self.self_maps.filter(|_| !is_free).map_or(1.0, |maps| {
                     let toward = receiver.rotation.inverse() * part.toward;
                     let map = &maps[v * BYTES..][..BYTES];
                     self_visibility::visible(

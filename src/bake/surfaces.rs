@@ -228,7 +228,8 @@ impl SurfacePlan {
             let bands = options.bands;
             let is_resting_group = members.len() > 1 && scene.is_at_rest(entities[0]);
             let screens = if is_resting_group { screens.clone() } else { Vec::new() };
-            let suns = if is_resting_group { suns.clone() } else { Vec::new() };
+            // Vertices of meshes that are left as they are may lie in the very seam of two walls.
+            let suns = if is_resting_group && refinement.is_some() { suns.clone() } else { Vec::new() };
             let plan = GroupPlan {
                 entities,
                 members,

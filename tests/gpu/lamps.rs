@@ -447,7 +447,7 @@ fn a_closed_room_in_the_sun_is_dark() {
         .entity(EntityData::of_mesh("carpet"))
         .build()
         .unwrap();
-    let bake = bake::Options { groups: true, ..bake::Options::default() };
+    let bake = bake::Options { groups: true, vertices: 20_000, ..bake::Options::default() };
     let options = frame::Options { size: [96, 64], bake, ..frame::Options::default() };
     let shown = gpu.picture(&scene, options, f32::INFINITY);
     let mean = shown.iter().sum::<f32>() / shown.len() as f32;

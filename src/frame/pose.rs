@@ -130,15 +130,11 @@ impl Frame {
     /// all that occludes is known also among those that they tell seen; none where something that rested has moved.
     pub(super) fn sun_bits(&self, placements: &[Placement]) -> HashMap<usize, [u32; 2]> {
         let stands = |(entity, stood): &(usize, Placement)| placements[*entity] == *stood;
-        if !self.stood.iter().all(stands) {
+        if self.told_suns.is_empty() || !self.stood.iter().all(stands) {
             return HashMap::new();
         }
         let blocks = |entity: &usize| self.scene.entities[*entity].occludes;
-        let is_solid = |entity: usize| {
-            let of = &self.scene.entities[entity];
-            self.scene.is_at_rest(entity) && !of.transparent && of.opacity >= 1.0
-        };
-        let is_known = (0..self.scene.entities.len()).filter(blocks).all(is_solid);
+        let is_known = (0..self.scene.entities.len()).filter(blocks).all(|entity| self.scene.rests_opaque(entity));
         let suns = self.told_suns.iter().enumerate().filter(|(_, sun)| stands(sun));
         suns.map(|(place, (sun, _))| (*sun, [1 << place, u32::from(is_known) << place])).collect()
     }

@@ -18,10 +18,9 @@ const GAP: f64 = 1e-3;
 pub(super) fn reaches(scene: &Scene, placements: &[Placement]) -> Vec<[f64; 2]> {
     let blocks = |&entity: &usize| {
         let of = &scene.entities[entity];
-        of.occludes && !of.emits && !of.transparent && of.opacity >= 1.0
+        of.occludes && !of.emits && scene.rests_opaque(entity)
     };
-    let resting: Vec<usize> =
-        (0..scene.data.entities.len()).filter(|entity| scene.is_at_rest(*entity)).filter(blocks).collect();
+    let resting: Vec<usize> = (0..scene.data.entities.len()).filter(blocks).collect();
     let boxes: Vec<(&Placement, PlacedCuboid)> = resting
         .iter()
         .flat_map(|&entity| {

@@ -340,6 +340,12 @@ impl Scene {
         self.carriers(entity).is_some_and(<[Motion]>::is_empty)
     }
 
+    /// Whether it rests and keeps all light back where it blocks.
+    pub(crate) fn rests_opaque(&self, entity: usize) -> bool {
+        let Entity { transparent, opacity, .. } = self.entities[entity];
+        self.is_at_rest(entity) && !transparent && opacity >= 1.0
+    }
+
     /// The nodes that carry an entity, none where it rests: entities with the same ones never move against each other.
     /// `None` of one that has movements of its own or was taken out of its group.
     pub(crate) fn carriers(&self, entity: usize) -> Option<&[Motion]> {

@@ -2,7 +2,6 @@
 struct CellTriangle {
     uvec3 vertices;
     vec3 weights;
-    uint first; // of its vertices
 };
 
 CellTriangle cell_triangle(utextureBuffer corners, uvec2 cells, vec2 place) {
@@ -23,6 +22,5 @@ CellTriangle cell_triangle(utextureBuffer corners, uvec2 cells, vec2 place) {
         found.weights = far ? vec3(1.0 - within.y, 1.0 - within.x, within.x + within.y - 1.0)
                             : vec3(within.x, within.y, 1.0 - within.x - within.y);
     }
-    found.first = min(found.vertices.x, min(found.vertices.y, found.vertices.z));
     return found;
 }

@@ -15,7 +15,6 @@ layout(location = 3) out vec3 tint;
 #endif
 #if PIXEL
 layout(location = 4) out float edge; // whether a shadow's edge comes near
-#include "marks.glsl"
 #endif
 #if GLOSS
 layout(binding = 1) uniform textureBuffer vertices;
@@ -42,7 +41,7 @@ void main() {
     tint = tint_of(paint);
 #endif
 #if PIXEL
-    edge = marks_edge(unpack_marks(radiosity.w)) ? 1.0 : 0.0;
+    edge = radiosity.w;
 #endif
 #if GLOSS
     pass_gloss(push.entity, uint(gl_VertexIndex));

@@ -30,7 +30,7 @@ void main() {
     vec3 light = blend(radiosity, lit, found.weights);
 #if PIXEL
     vec4 shares = vec4(0.0);
-    find_light(push.entity, marks_edge(marks_of(radiosity, lit)), light, shares);
+    find_light(push.entity, is_marked(radiosity, lit), light, shares);
 #endif
     color = vec4(finish(push.emission_white.rgb + light, push.emission_white.w), push.tag);
 }

@@ -2,9 +2,6 @@
 layout(push_constant) uniform Push {
     mat4 clip_from_object;
     uvec2 cells;
-    uint first;         // its first vertex in the radiosity buffer
-    uint receiver;      // the entity
-    uint cluster_first; // its first cluster among those whose chains are known
-    uint spare[3];
-    vec4 normal;        // object's frame
+    uint first;    // its first vertex in the radiosity buffer
+    uint receiver; // the entity
 } push;

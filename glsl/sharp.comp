@@ -26,8 +26,8 @@ READ_UVEC2(7, SelfCells, self_cells, self_cell)
 uint told_suns; // of the vertex: src/layout.rs
 #if EDGES
 #define KEEPS 1
-// Bits of floats, of all vertices by one light after another.
-layout(std430, binding = 12) buffer Irradiances { uint irradiances[]; };
+// Of all vertices by one light after another: KeptIrradiance.
+layout(std430, binding = 12) buffer Irradiances { uvec2 irradiances[]; };
 layout(push_constant) uniform Push {
     uint kept_lights;
     uint all_vertices;
@@ -68,7 +68,7 @@ void main() {
     vec3 soft = sum.rgb;
     kept_vertex = cluster.radiosity_first + v;
     for (uint l = 0; l < push.kept_lights; l++) {
-        irradiances[l * push.all_vertices + kept_vertex] = 0;
+        irradiances[l * push.all_vertices + kept_vertex] = uvec2(0);
     }
 #endif
 #if SHOWN
@@ -82,7 +82,7 @@ void main() {
     }
 #if EDGES
     float tolerable = tolerable_miss(receiver.albedo, soft);
-    sum.w = pack_marks(missed > tolerable, near_occluders);
+    sum.w = missed > tolerable ? 1.0 : 0.0;
     settle_kept(tolerable);
 #endif
     radiosity[cluster.radiosity_first + v] = sum;

@@ -69,10 +69,13 @@ float tolerable_miss(vec3 albedo, vec3 soft) {
     return all / (EDGE_STEPS * EDGE_STEPS);
 }
 
-#include "marks.glsl"
-// Occluders that take any of a light or whose edges are near: with BLENDS as the vertices of a pixel's triangle tell them,
-// else as this vertex finds them.
-uint near_occluders = 0;
+// A bit for occluders that take any of the current light or whose edges are near, shared by those whose numbers leave the
+// same rest: with BLENDS as the vertices of a pixel's triangle tell them, else as this vertex finds them.
+uint near_occluders;
+
+uint occluder_bit(uint packed) {
+    return 1u << (packed & 31u);
+}
 #endif
 
 // Which way a vertex faces, and what its own mesh leaves of its view.
@@ -161,16 +164,15 @@ void find_rim(float ramp, Entity shining, float step) {
 void note_occluder(uint packed, vec4 free, uint b, inout uint covered, inout float nearest) {
 #if KEEPS
     bool matters = finest > 0.0 || free != vec4(1.0);
-    near_occluders |= matters ? occluder_bit(packed & SKY_CHAIN) : 0;
+    near_occluders |= matters ? occluder_bit(packed) : 0;
 #endif
     covered |= finest == 0.0 && free == vec4(0.0) ? 1u << b : 0;
     nearest = max(nearest, finest);
 }
 
-// Adds a light to all; returns what vertices miss of it.
-float add_open(float irradiance, float cone, Entity shining) {
-    float white = cone * dot(shining.emission, vec3(1.0));
-    float miss = white * max(finest * finest * irradiance, NEAR_LIGHT * curved);
+// Adds a light to all, of `white` radiance in three channels together; returns what vertices miss of it.
+float add_open(float irradiance, float white) {
+    float miss = white * max(min(finest * finest, MOST_MISS) * irradiance, NEAR_LIGHT * curved);
     open_light += white * irradiance;
     missed = max(missed, miss);
     return miss;
@@ -180,26 +182,39 @@ float add_open(float irradiance, float cone, Entity shining) {
 #if KEEPS
 const float LEAST_KEPT = 1e-30; // of what is not dark
 
-// Keeps the irradiance by a light of radiance 1 for pixels around the vertex. Until all lights are known, its last bits
-// hold what vertices miss of it, in sixteenths of an octave, 0 for nothing.
-const uint MISS_BITS = 0xfffu;
+// What vertices miss of a light, in sixteenths of an octave; 0 for nothing.
+const uint MISS_BITS = 12;
+const uint ALL_MISS = (1u << MISS_BITS) - 1u;
 const float LEAST_OCTAVE = -110.0;
 
-void keep(Entity shining, float irradiance, float miss) {
+uint pack_miss(float miss) {
+    float sixteenths = clamp(16.0 * (log2(max(miss, 1e-30)) - LEAST_OCTAVE), 1.0, float(ALL_MISS));
+    return miss > 0.0 ? uint(sixteenths) : 0;
+}
+
+bool is_missed(uint packed, float tolerable) {
+    return packed > 0 && exp2(float(packed) / 16.0 + LEAST_OCTAVE) > BLENDED_MISS * tolerable;
+}
+
+// Keeps the irradiance by a light of radiance 1 for pixels around the vertex, and the bits of occluders. Until all lights
+// are known, the last bits hold what vertices miss of it, and those before what they might of a light that is dark.
+void keep(Entity shining, bool dark, float irradiance, float miss, float might_miss) {
     if (shining.irradiance_first != NONE) {
-        float sixteenths = clamp(16.0 * (log2(max(miss, 1e-30)) - LEAST_OCTAVE), 1.0, float(MISS_BITS));
-        uint code = miss > 0.0 ? uint(sixteenths) : 0;
-        irradiances[shining.irradiance_first + kept_vertex] = floatBitsToUint(irradiance) & ~MISS_BITS | code;
+        uint known = dark ? pack_miss(might_miss) << MISS_BITS : floatBitsToUint(max(irradiance, LEAST_KEPT)) & ~ALL_MISS;
+        irradiances[shining.irradiance_first + kept_vertex] = uvec2(known | pack_miss(miss), near_occluders);
     }
 }
 
-// Once all lights are known: what is kept becomes the irradiance, below zero where pixels need to evaluate the light.
+// Once all lights are known: what is kept becomes the irradiance, below zero where pixels need to evaluate the light. In
+// the dark it is 0, unless the light is so faint that it does not matter beside a vertex that is lit.
 void settle_kept(float tolerable) {
     for (uint l = 0; l < push.kept_lights; l++) {
-        uint at = l * push.all_vertices + kept_vertex, kept = irradiances[at], code = kept & MISS_BITS;
-        bool needed = code > 0 && exp2(float(code) / 16.0 + LEAST_OCTAVE) > BLENDED_MISS * tolerable;
-        float irradiance = uintBitsToFloat(kept & ~MISS_BITS);
-        irradiances[at] = floatBitsToUint(needed ? -max(irradiance, LEAST_KEPT) : irradiance);
+        uint at = l * push.all_vertices + kept_vertex, kept = irradiances[at].x;
+        bool dark = kept < 1u << 2 * MISS_BITS;
+        bool might = kept == 0 || is_missed(kept >> MISS_BITS & ALL_MISS, tolerable);
+        float lit = dark ? LEAST_KEPT : uintBitsToFloat(kept & ~ALL_MISS);
+        bool needed = is_missed(kept & ALL_MISS, tolerable);
+        irradiances[at].x = needed ? floatBitsToUint(-lit) : dark && might ? 0 : floatBitsToUint(lit);
     }
 }
 #endif
@@ -210,8 +225,10 @@ void settle_kept(float tolerable) {
 bool blended_irradiance(Entity shining, out float irradiance) {
     bool is_kept = shining.irradiance_first != NONE;
     uvec3 at = lit_vertices + (is_kept ? shining.irradiance_first : 0);
-    vec3 kept = vec3(texelFetch(irradiances, int(at.x)).x, texelFetch(irradiances, int(at.y)).x,
-                     texelFetch(irradiances, int(at.z)).x);
+    uvec2 a = texelFetch(irradiances, int(at.x)).xy, b = texelFetch(irradiances, int(at.y)).xy;
+    uvec2 c = texelFetch(irradiances, int(at.z)).xy;
+    near_occluders = is_kept ? a.y | b.y | c.y : ~0u;
+    vec3 kept = uintBitsToFloat(uvec3(a.x, b.x, c.x));
     irradiance = dot(vertex_weights, kept);
     return is_kept && (kept == vec3(0.0) || all(greaterThan(kept, vec3(0.0))));
 }
@@ -453,11 +470,6 @@ bool has_outline(uint packed) {
 // Whether the ball of an entry's occluder reaches into the cone around all parts of its chain's light, as far as the
 // light. `radius`: of the light's bounding sphere, metres.
 bool may_block(uint packed, Surface surface, SeenLight light, float radius) {
-#if BLENDS
-    if ((near_occluders & occluder_bit(packed & SKY_CHAIN)) == 0) {
-        return false;
-    }
-#endif
     vec4 ball = ENTITY(packed & SKY_CHAIN).centre;
     vec3 to_ball = ball.xyz - surface.origin - surface.position;
     float sine = min(CONE_WIDER * light.sine, MOST_SINE);
@@ -480,14 +492,22 @@ bool may_block(uint packed, Surface surface, SeenLight light, float radius) {
     return meets;
 }
 
-// The first entry of a chain from `i` on that has to be evaluated: an occluder that may block, or the light.
+// The first entry of a chain from `i` on that has to be evaluated: an occluder that may block, or the light at `end`.
 // Values of this loop are read again behind it: on lavapipe a lane that leaves a loop early may lose what the loop does
 // not carry.
-uint next_entry(Surface surface, SeenLight light, float radius, uint i) {
+uint next_entry(Surface surface, SeenLight light, float radius, uint i, uint end) {
     bool passes = false;
     do {
-        uint packed = entry_at(i);
-        passes = (packed & ENTRY_LIGHT) == 0 && !may_block(packed, surface, light, radius);
+#if BLENDS
+        // Few are marked.
+        i = near_occluders == 0 ? end : i;
+        bool unmarked = false;
+        do {
+            unmarked = i < end && (near_occluders & occluder_bit(entry_at(i))) == 0;
+            i += unmarked ? 1 : 0;
+        } while (unmarked);
+#endif
+        passes = i < end && !may_block(entry_at(i), surface, light, radius);
         i += passes ? 1 : 0;
     } while (passes);
     return i;
@@ -506,6 +526,9 @@ vec3 chain_sum(Surface surface, uint i, uint end) {
     }
 #endif
     float radius = 1.0 / shining.centre.w;
+#if KEEPS
+    near_occluders = 0;
+#endif
 #if HIDES
     // Where the sun is hidden from all around, no edge of its shadow is looked for.
     bool is_hidden = (told_suns & shining.sun_bit) != 0;
@@ -516,8 +539,8 @@ vec3 chain_sum(Surface surface, uint i, uint end) {
 #if SHOWN || PANELS || HIDES
     open_share = 0.0;
 #endif
-#if EDGES
     float unblocked = 0.0;
+#if EDGES
     curved = 0.0;
     float nearest = 0.0; // `finest` of all occluders
     uint covered = 0; // a bit for every block that one occluder hides whose own edges are far
@@ -527,13 +550,12 @@ vec3 chain_sum(Surface surface, uint i, uint end) {
     do {
         vec4 share = part_shares(surface, light, block_of(light, b));
         set_block(shares, b, share);
-#if EDGES
         unblocked += dot(share, vec4(1.0));
-#endif
         b++;
     } while (b <= last_block);
     float shines = shining.light_kind == LIGHT_BALL ? shining.light_size : 1.0;
-    i = next_entry(surface, light, radius, i);
+    // Of a light below the horizon nothing is left to block.
+    i = unblocked > 0.0 ? next_entry(surface, light, radius, i, end) : end;
     uint packed = entry_at(i);
     b = first_block;
     do {
@@ -548,7 +570,7 @@ vec3 chain_sum(Surface surface, uint i, uint end) {
 #endif
             bool last = b == last_block;
             b = last ? first_block : b + 1;
-            i = last ? next_entry(surface, light, radius, i + 1) : i;
+            i = last ? next_entry(surface, light, radius, i + 1, end) : i;
             packed = entry_at(i);
         }
     } while (has_outline(packed));
@@ -562,11 +584,16 @@ vec3 chain_sum(Surface surface, uint i, uint end) {
 #endif
     do {
         if (is_kind(packed, ENTRY_SHEET)) {
+#if KEEPS
+            vec4 free_before = shadow.free;
+            nearest = max(nearest, finest);
+            finest = 0.0;
+#endif
             pass_sheet(shadow, ENTITY(packed & SKY_CHAIN), surface, light, block_of(light, b));
 #if KEEPS
-            near_occluders |= occluder_bit(packed & SKY_CHAIN);
+            near_occluders |= finest > 0.0 || shadow.free != free_before ? occluder_bit(packed) : 0;
 #endif
-            i = next_entry(surface, light, radius, i + 1);
+            i = next_entry(surface, light, radius, i + 1, end);
             packed = entry_at(i);
             if (!is_kind(packed, ENTRY_SHEET)) {
                 set_block(shares, b, shadow.free * of_block(shares, b));
@@ -595,7 +622,7 @@ vec3 chain_sum(Surface surface, uint i, uint end) {
 #endif
             bool last = b == last_block;
             b = last ? first_block : b + 1;
-            i = last ? next_entry(surface, light, radius, i + 1) : i;
+            i = last ? next_entry(surface, light, radius, i + 1, end) : i;
             packed = entry_at(i);
         }
     } while (is_kind(packed, ENTRY_CUBOID));
@@ -605,9 +632,9 @@ vec3 chain_sum(Surface surface, uint i, uint end) {
         if (is_kind(packed, ENTRY_GLOBE)) {
             shines *= 1.0 - ENTITY(packed & SKY_CHAIN).opacity;
 #if KEEPS
-            near_occluders |= occluder_bit(packed & SKY_CHAIN);
+            near_occluders |= occluder_bit(packed);
 #endif
-            i = next_entry(surface, light, radius, i + 1);
+            i = next_entry(surface, light, radius, i + 1, end);
             packed = entry_at(i);
         }
     } while (is_kind(packed, ENTRY_GLOBE));
@@ -661,7 +688,8 @@ vec3 chain_sum(Surface surface, uint i, uint end) {
     bool hidden = covered == (2u << last_block) - (1u << first_block);
     finest = hidden ? 0.0 : nearest;
     find_rim(ramp, shining, surface.step / max(light.distance, 1e-30));
-    float miss = add_open(unblocked, cone, shining);
+    float white = cone * dot(shining.emission, vec3(1.0));
+    float miss = add_open(unblocked, white);
 #endif
 #if KEEPS
     bool dark = passed <= 0.001 * unblocked && unblocked > 0.0;
@@ -686,7 +714,7 @@ vec3 chain_sum(Surface surface, uint i, uint end) {
 #endif
 #endif
 #if KEEPS
-    keep(shining, dark ? 0.0 : max(kept_irradiance * cone, LEAST_KEPT), miss);
+    keep(shining, dark, kept_irradiance * cone, miss, MOST_MISS * white * unblocked);
 #endif
 #if LAMPS
     lamps += irradiance / PI;

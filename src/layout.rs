@@ -384,8 +384,6 @@ pub const HAS_HALVES: u32 = 1 << 31;
 /// Flag of the number of a cluster's entries, for pixels: only maps of its own vertices go with them, as those of
 /// neighbouring clusters have other shadows.
 pub const OWN_MAPS: u32 = 1 << 31;
-/// Occluders that the marks of a vertex keep apart: `glsl/marks.glsl`. Those whose numbers leave the same rest share a bit.
-const MARKED_OCCLUDERS: u32 = 29;
 /// Bits of a lattice's factors (see [`crate::field::Fit::packed`]).
 pub const FIT_BITS: u32 = 21;
 /// How far apart tags of entities are in a picture's alpha: as 8 bits tell.
@@ -394,7 +392,7 @@ pub const TAG_STEP: f32 = 1.0 / 255.0;
 pub const COSINE_LOBE: [f64; 3] = [0.09375, 0.5, 0.46875];
 
 /// The macros that every shader has: what both languages have to agree on.
-pub fn shared_macros() -> [(&'static str, String); 16] {
+pub fn shared_macros() -> [(&'static str, String); 15] {
     let [a, b, c] = COSINE_LOBE;
     let kind = |kind: LightKind| format!("{}u", kind as u32);
     [
@@ -403,7 +401,6 @@ pub fn shared_macros() -> [(&'static str, String); 16] {
         ("UPWARDS", format!("{UPWARDS:#x}u")),
         ("HAS_HALVES", format!("{HAS_HALVES:#x}u")),
         ("OWN_MAPS", format!("{OWN_MAPS:#x}u")),
-        ("MARKED_OCCLUDERS", format!("{MARKED_OCCLUDERS}u")),
         ("MOST_SUNS", format!("{MOST_SUNS}u")),
         ("FIT_BITS", FIT_BITS.to_string()),
         ("TAG_STEP", format!("{TAG_STEP:?}")),

@@ -14,7 +14,7 @@ use shadow_fields::bounce::movers::{distant_row, movers_row, outgoing_row};
 use shadow_fields::bounce::{bounce_row, runs_row};
 use shadow_fields::draw::grid::DrawGrid;
 use shadow_fields::draw::mirror::Mirrored;
-use shadow_fields::draw::pixel_light::{LightImages, Receiver, Way};
+use shadow_fields::draw::pixel_light::{LightImages, Receiver, Step};
 use shadow_fields::draw::smooth::Smooth;
 use shadow_fields::draw::triangles::{Detail, DrawTriangles, Form, Look};
 use shadow_fields::field::{FieldKind, Storage};
@@ -126,14 +126,13 @@ fn drawing() -> Vec<ShaderPermutation> {
         };
         [of(1), of(4)].concat()
     });
-    let lit = sharp.iter().flat_map(|sharp| {
-        Receiver::ALL.iter().flat_map(|receiver| {
-            [Way::Evaluated, Way::Interpolated].map(|way| LightImages::rows(sharp, *receiver, way)).concat()
-        })
-    });
+    let seen = Receiver::ALL.iter().flat_map(|receiver| LightImages::rows(*receiver));
+    let lit = [Step::Coarse, Step::Fine].map(LightImages::select_row).into_iter();
+    let lit = lit.chain(sharp.iter().map(LightImages::evaluate_row));
     grids
         .into_iter()
         .chain(triangles)
+        .chain(seen)
         .chain(lit)
         .chain([Smooth::fragment()])
         .chain(

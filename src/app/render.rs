@@ -302,8 +302,8 @@ impl<'a> Rendering<'a> {
         let options = &self.options;
         let pictures = self.timings.iter().map(|(time_s, wall, passes)| {
             let named = |t: &Timing| (format!("{}_ms", t.pass.replace(' ', "_")), json!(t.milliseconds));
-            // Only pixels that evaluate sharp lights are counted, where the device can.
-            let evaluated = passes.iter().find_map(|timing| timing.samples);
+            // Only pixels that evaluate sharp lights are counted.
+            let evaluated = passes.iter().find_map(|timing| timing.counted);
             let passes: serde_json::Map<_, _> = passes.iter().map(named).collect();
             json!({
                 "time_s": time_s, "frame_ms": wall.as_secs_f64() * 1e3, "passes": passes,

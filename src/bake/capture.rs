@@ -219,7 +219,7 @@ impl Capture {
     ) -> Result<()> {
         let radiance = self.kind == FieldKind::Radiance;
         let background = if radiance { [0.0, 0.0, 0.0, 1.0] } else { [1.0; 4] };
-        let target = Target { color: &self.atlas, clear: Some(background), depth, resolve: None };
+        let target = Target { color: &self.atlas, second: None, clear: Some(background), depth, resolve: None };
         let mut vertices = vec![(&self.model.positions, 0)];
         vertices.extend(self.model.colors.iter().filter(|_| radiance).map(|colors| (colors, 0)));
         commands.render(&target, |drawing| {

@@ -249,7 +249,7 @@ impl Silhouette {
         map_first: usize,
     ) -> Result<()> {
         assert!(frames.len() <= self.capacity(), "{} views in an atlas of {}", frames.len(), self.capacity());
-        let target = Target { color: &self.atlas, clear: Some([CLEAR; 4]), depth: None, resolve: None };
+        let target = Target { color: &self.atlas, second: None, clear: Some([CLEAR; 4]), depth: None, resolve: None };
         commands.image_barrier(&self.atlas, None, Access::ColorWrite);
         commands.render(&target, |drawing| {
             drawing.bind(&self.view, &[(&buffers.positions, 0)], &buffers.indices);

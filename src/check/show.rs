@@ -46,7 +46,7 @@ fn compare(baker: &Baker, format: vk::Format) -> Result<f64> {
     commands.copy_to_image(&upload, &picture);
     commands.image_barrier(&picture, Some(Access::TransferWrite), Access::GraphicsSampled);
     commands.image_barrier(&shown, None, Access::ColorWrite);
-    let target = Target { color: &shown, clear: Some([0.0; 4]), depth: None, resolve: None };
+    let target = Target { color: &shown, second: None, clear: Some([0.0; 4]), depth: None, resolve: None };
     commands.pass("show", |c| c.render(&target, |drawing| show.record(drawing, &picture, WHITE)))?;
     commands.image_barrier(&shown, Some(Access::ColorWrite), Access::TransferRead);
     commands.submit()?;

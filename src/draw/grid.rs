@@ -13,7 +13,7 @@ use crate::asset::grid::Grid;
 use crate::draw::pixel_light::{LIGHT_BINDING, shown_light, texels};
 use crate::draw::{DrawnEntity, DrawnViewport, EntityPush, PipelineMaker, made_once};
 use crate::error::Result;
-use crate::gpu::{Bind, Buffer, Device, Drawing, GraphicsPipeline, Image, TexelView};
+use crate::gpu::{Bind, Buffer, Device, Drawing, GraphicsPipeline, TexelView};
 use crate::layout::{QUAD_FORMAT, UPWARDS};
 use crate::shaders::ShaderPermutation;
 use ash::vk;
@@ -76,7 +76,6 @@ pub struct DrawnGrid {
     /// [`Patches`]: positions, places and indices.
     pub(super) patches: [Buffer; 3],
     pub(super) patch_indices: u32,
-    pub(super) normal: Vec3,
     /// Diagonal of a cell at most, metres.
     pub reach_m: f32,
     /// Longest side of a cell, metres.
@@ -89,7 +88,7 @@ impl DrawnGrid {
 
     /// Uploads a grid. `centre` is that of the mesh's bounding sphere, `place` where each vertex of the mesh stands
     /// among those that are lit.
-    pub fn new(device: &Arc<Device>, grid: &Grid, centre: Vec3, normal: Vec3, place: &[u32]) -> Result<Self> {
+    pub fn new(device: &Arc<Device>, grid: &Grid, centre: Vec3, place: &[u32]) -> Result<Self> {
         let corner = grid.corner - centre;
         let [u, v] = grid.sides;
         let positions = [corner, corner + u, corner + v, corner + u + v].map(|p| p.to_array());
@@ -113,7 +112,6 @@ impl DrawnGrid {
                 Buffer::with_data(device, "grid patch indices", &patches.indices)?,
             ],
             patch_indices: 3 * patches.indices.len() as u32,
-            normal,
             reach_m: u.length() / columns + v.length() / rows,
             step_m: (u.length() / columns).max(v.length() / rows),
         })
@@ -159,7 +157,7 @@ impl DrawGrid {
     /// Vertex and fragment shader.
     pub fn rows(by_pixel: bool) -> [ShaderPermutation; 2] {
         [
-            ShaderPermutation::new("grid.vert", 4).define("EVALUATED", false).define("BLOCK_CELLS", 0_u32),
+            ShaderPermutation::new("grid.vert", 4).define("BLOCK_CELLS", 0_u32),
             shown_light(ShaderPermutation::new("grid.frag", 4), by_pixel),
         ]
     }
@@ -172,13 +170,13 @@ impl DrawGrid {
         (grid, indices): (&'r DrawnGrid, Range<u32>),
         entity: &DrawnEntity<'r>,
         viewport: &DrawnViewport<'r>,
-        light: Option<&'r Image>,
+        light: Option<&'r Buffer>,
         white: f32,
     ) -> Result<()> {
         drawing.bind(self.pipeline(light.is_some())?, &[(&grid.positions, 0), (&grid.places, 0)], &grid.indices);
         let mut binds = texels(&[(&grid.corners, QUADS), (viewport.radiosity, QUAD_FORMAT)])?;
         binds.resize(LIGHT_BINDING as usize, Bind::None);
-        binds.extend(light.map(Bind::Image));
+        binds.extend(light.map(Bind::Buffer));
         drawing.resources(&binds)?;
         drawing.push(&Push {
             entity: EntityPush::new(entity, white),

@@ -168,7 +168,7 @@ impl Mirrors {
         self.draw.record(commands, viewports, Vec4::ZERO, MOST_RADIANCE)?;
         commands.image_barrier(&self.draw.depth, Some(Access::DepthWrite), Access::GraphicsSampled);
         commands.image_barrier(&self.far, None, Access::ColorWrite);
-        let target = Target { color: &self.far, clear: None, depth: None, resolve: None };
+        let target = Target { color: &self.far, second: None, clear: None, depth: None, resolve: None };
         commands.render(&target, |drawing| {
             drawing.area([0, 0, width, self.far.shape.height]);
             drawing.screen(&self.to_far, &[Bind::Image(&self.draw.depth)], &())

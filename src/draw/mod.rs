@@ -110,7 +110,7 @@ impl DrawnMesh {
             Grid::find(mesh).filter(|_| is_plain).filter(|grid| DrawnGrid::fits(device, grid.vertices.len(), vertices))
         {
             return Ok(DrawnMesh::Grid(
-                DrawnGrid::new(device, &grid, centre, mesh.normals[0], &place)?,
+                DrawnGrid::new(device, &grid, centre, &place)?,
                 TriangleRun::of(mesh, &mesh.triangles),
             ));
         }
@@ -365,7 +365,7 @@ impl Draw {
     }
 
     /// The light of an entity's pixels in a viewport.
-    fn light_of(&self, viewport: &DrawnViewport<'_>, entity: &DrawnEntity<'_>) -> Option<&Image> {
+    fn light_of(&self, viewport: &DrawnViewport<'_>, entity: &DrawnEntity<'_>) -> Option<&Buffer> {
         let has_pixels = viewport.pixel.is_some() && entity.by_pixel.is_some();
         self.light.as_ref().filter(|_| has_pixels).map(LightImages::light)
     }
@@ -406,6 +406,7 @@ impl Draw {
         let background = (factor * background.truncate()).extend(background.w);
         let target = Target {
             color: self.samples.as_ref().unwrap_or(&self.picture),
+            second: None,
             clear: Some(background.to_array()),
             depth: Some(&self.depth),
             resolve: self.samples.as_ref().map(|_| &self.picture),
@@ -427,7 +428,7 @@ impl Draw {
                 for (viewport, entity, indices) in batch {
                     let light = self.light_of(viewport, entity);
                     if bound.is_none_or(|bound| !std::ptr::eq(bound, entity)) {
-                        drawing.part_of(viewport.area, viewport.drawn, 1);
+                        drawing.part_of(viewport.area, viewport.drawn);
                         if let DrawnMesh::Triangles(mesh) = entity.mesh {
                             let layer = DrawnLayer::Opaque { light };
                             self.triangles.bind(
@@ -454,7 +455,7 @@ impl Draw {
                 }
                 for viewport in viewports {
                     if let Some(sky) = &viewport.sky {
-                        drawing.part_of(viewport.area, viewport.drawn, 1);
+                        drawing.part_of(viewport.area, viewport.drawn);
                         self.sky.record(drawing, sky, white)?;
                     }
                 }
@@ -474,7 +475,7 @@ impl Draw {
         for viewport in viewports {
             for entity in viewport.entities.iter().filter(|entity| entity.transparent && !entity.indices.is_empty()) {
                 let DrawnMesh::Triangles(mesh) = entity.mesh else { continue };
-                drawing.part_of(viewport.area, viewport.drawn, 1);
+                drawing.part_of(viewport.area, viewport.drawn);
                 // Of one entity the nearest place alone is seen, in whatever order its triangles come.
                 for layer in [DrawnLayer::Depth, DrawnLayer::Over] {
                     self.triangles.bind(drawing, mesh, entity, viewport, self.mirrors.as_deref(), white, layer)?;

@@ -4,22 +4,23 @@
 //! A pixel evaluates the lights of which one of its triangle's vertices misses more than all light there hides, and those
 //! that some of them see and others do not. Of the others it blends what vertices have.
 //!
-//! Every fourth pixel along both axes is evaluated first, for its neighbours too, and finds whether an edge comes near
-//! that they show badly: the rule of the vertices, with pixels as steps. Between four of them on one surface that are far
-//! from such edges, light is interpolated; the other pixels are evaluated. In a room of wide penumbras 20 % of the pixels
-//! of marked triangles are, and pictures differ by 0.0008 of their RMS from those of all pixels.
+//! The surfaces that pixels show are drawn first. Every fourth pixel along both axes is evaluated then, for its
+//! neighbours too, and finds whether an edge comes near that they show badly: the rule of the vertices, with pixels as
+//! steps. Between four of them on one surface that are far from such edges, light is interpolated; the other pixels are
+//! listed and evaluated. In a room of wide penumbras 20 % of the pixels of marked triangles are, and pictures differ by
+//! 0.0008 of their RMS from those of all pixels.
 //!
-//! Output: an image of the picture's size with light, shares of highlights' lights, depth, entity and its side
-//! (`glsl/screen_light.glsl`), which pass "draw" looks up. It has one sample a pixel: an evaluation is made once a pixel,
-//! and llvmpipe skips pixels that are hidden or done where it has no others to test.
+//! Output: light, shares of highlights' lights, depth, entity and its side of every pixel (`glsl/screen_light.glsl`),
+//! which pass "draw" looks up. Places of a list are evaluated side by side: where triangles are small, a fragment shader
+//! runs for few pixels of each block of them.
 
 use crate::draw::grid::{self, BLOCK_CELLS};
 use crate::draw::triangles::DrawnTriangles;
 use crate::draw::{DEPTH, DrawnEntity, DrawnMesh, DrawnPaint, DrawnViewport, PipelineMaker, made_once};
 use crate::error::Result;
 use crate::gpu::{
-    Access, Bind, Buffer, Commands, Device, Drawing, GraphicsPipeline, GraphicsState, Image, ImageShape, Target,
-    TexelView,
+    Access, Bind, Buffer, BufferKind, Commands, ComputePipeline, Device, Drawing, GraphicsPipeline, GraphicsState, Image,
+    ImageShape, Target, TexelView,
 };
 use crate::layout::QUAD_FORMAT;
 use crate::shaders::{Library, ShaderPermutation};
@@ -29,24 +30,29 @@ use bytemuck::{Pod, Zeroable};
 use rayon::prelude::*;
 use std::sync::{Arc, OnceLock};
 
-/// Texel of a pixel: light and blue's flag as halves, shares as bytes, depth, entity and its side.
-const LIGHT: vk::Format = vk::Format::R32G32B32A32_UINT;
+/// What is kept of the surface that a pixel shows, twice (`glsl/seen_surface.glsl`).
+const SEEN: vk::Format = vk::Format::R32G32B32A32_UINT;
+/// Bytes of a place's light: light and blue's flag as halves, shares as bytes, depth, entity and its side.
+const LIGHT_BYTES: u64 = 16;
 /// Pixels along an edge of a coarse texel.
 const COARSE_PX: u32 = 4;
+/// Places that one invocation selects, across and down.
+const SELECTED_BLOCK: [u32; 2] = [4, 2];
 /// Share of its distance that a place may lie in front of a texel's, or behind, and have its light.
 const SAME_DEPTH: f64 = 1e-4;
 /// Share of the brightest of four coarse texels by which they may differ.
 const MOST_CHANGE: f64 = 0.08;
 /// Least weight of the four coarse texels around a pixel that lie on its surface.
 const LEAST_WHOLE: f64 = 0.5;
-/// Binding of the image in the shaders that look it up.
+/// Binding of pixels' light in the shaders that look it up.
 pub(super) const LIGHT_BINDING: u32 = 11;
-/// Binding of the coarse image in the shader that interpolates.
-const COARSE_BINDING: u32 = 13;
 
 /// Where the pixels of an entity find what they evaluate sharp lights by.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[repr(C)]
+#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
 pub struct ByPixel {
+    /// Its first vertex among all that are lit.
+    pub lit_first: u32,
     /// Its first cluster in [`PixelLight::chains`].
     pub cluster_first: u32,
     /// The first vertex of its mesh in [`PixelLight::vertices`].
@@ -56,6 +62,8 @@ pub struct ByPixel {
 }
 
 pub struct PixelLight<'d> {
+    /// [`ByPixel`] of every entity.
+    pub receivers: &'d Buffer,
     /// [`crate::layout::DeviceEntity`] of every entity.
     pub entities: &'d Buffer,
     /// Nodes and cells of all silhouette fields.
@@ -82,15 +90,6 @@ pub(super) fn texels<'r>(buffers: &[(&'r Buffer, vk::Format)]) -> Result<Vec<Bin
 /// The macros of a shader that looks up the light of its pixel, or of one that may.
 pub(super) fn shown_light(row: ShaderPermutation, looks_up: bool) -> ShaderPermutation {
     row.define("PIXEL", looks_up).define("LIGHT_BINDING", LIGHT_BINDING).number("SAME_DEPTH", SAME_DEPTH)
-}
-
-/// How a pixel comes by its light.
-#[derive(Clone, Copy)]
-pub enum Way {
-    /// It evaluates the lights.
-    Evaluated,
-    /// From coarse texels, where these suffice.
-    Interpolated,
 }
 
 #[derive(Clone, Copy)]
@@ -132,9 +131,7 @@ struct TrianglePush {
     clip_from_object: [f32; 16],
     first: u32,
     receiver: u32,
-    cluster_first: u32,
     vertex_first: u32,
-    self_first: u32,
     alpha_cutoff: f32,
 }
 
@@ -145,60 +142,93 @@ struct GridPush {
     cells: [u32; 2],
     first: u32,
     receiver: u32,
-    cluster_first: u32,
+}
+
+#[repr(C)]
+#[derive(Clone, Copy, Pod, Zeroable)]
+struct SelectPush {
+    /// Left, top, width and height in pixels.
+    part: [u32; 4],
+    /// Of the picture.
+    size: [u32; 2],
+    spare: [u32; 2],
+}
+
+#[repr(C)]
+#[derive(Clone, Copy, Pod, Zeroable)]
+struct EvaluatePush {
+    /// Which of the steps' lists.
+    list: u32,
+    /// Width of a place in pixels.
+    texel_px: u32,
+    /// Of the light in places.
+    width: u32,
+}
+
+/// The head of the list of places (`glsl/pixel_work.glsl`): how many pixels are evaluated in all, and of each step the
+/// workgroups that evaluate it and its places.
+#[repr(C)]
+#[derive(Clone, Copy, Pod, Zeroable)]
+struct PixelWork {
+    total: u32,
     spare: [u32; 3],
-    normal: [f32; 4],
+    steps: [[u32; 4]; 2],
 }
 
-/// An image of light with the depth that it was drawn by.
-struct Layer {
-    light: Image,
-    depth: Image,
+impl PixelWork {
+    const NONE: PixelWork = PixelWork { total: 0, spare: [0; 3], steps: [[0, 1, 1, 0]; 2] };
+    const STEPS_AT: u64 = 16;
+    const STEP_BYTES: u64 = 16;
 }
 
-impl Layer {
-    fn new(device: &Arc<Device>, name: &str, [width, height]: [u32; 2]) -> Result<Self> {
-        let shape = |format| ImageShape { format, width, height, samples: 1 };
-        Ok(Layer {
-            light: Image::new(device, name, shape(LIGHT))?,
-            depth: Image::new(device, &format!("{name}, depth"), shape(DEPTH))?,
-        })
-    }
+/// The two steps: coarse places, then pixels.
+#[derive(Clone, Copy)]
+pub enum Step {
+    Coarse,
+    Fine,
+}
 
-    /// Draws into both from nothing, and leaves the light to be read.
-    fn render<'r>(
-        &'r self,
-        commands: &mut Commands<'r>,
-        record: impl FnOnce(&mut Drawing<'_, 'r>) -> Result<()>,
-    ) -> Result<()> {
-        commands.image_barrier(&self.light, None, Access::ColorWrite);
-        commands.image_barrier(&self.depth, None, Access::DepthWrite);
-        let target = Target { color: &self.light, clear: Some([0.0; 4]), depth: Some(&self.depth), resolve: None };
-        commands.render(&target, record)?;
-        commands.image_barrier(&self.light, Some(Access::ColorWrite), Access::GraphicsSampled);
-        Ok(())
+impl Step {
+    fn texel_px(self) -> u32 {
+        if matches!(self, Step::Coarse) { COARSE_PX } else { 1 }
     }
 }
 
 struct LightPipelines {
     maker: PipelineMaker,
-    sharp: SharpPermutation,
-    /// By receiver and way; each is made where it is first drawn with.
-    made: [[OnceLock<GraphicsPipeline>; 2]; Receiver::ALL.len()],
+    /// By receiver; each is made where it is first drawn with.
+    drawn: [OnceLock<GraphicsPipeline>; Receiver::ALL.len()],
+    select: [ComputePipeline; 2],
+    evaluate: ComputePipeline,
+    /// [`PixelWork::NONE`].
+    none: Buffer,
 }
 
 pub struct LightImages {
     pipelines: Arc<LightPipelines>,
-    coarse: Layer,
-    fine: Layer,
+    /// What pixels show.
+    seen: [Image; 2],
+    depth: Image,
+    /// [`PixelWork`] and the places of one step.
+    work: Buffer,
+    /// Light of the places of each step, behind its size.
+    light: [Buffer; 2],
 }
 
 impl LightImages {
     /// For pictures of `width` x `height`.
     pub fn new(device: &Arc<Device>, library: &Library, size: [u32; 2], sharp: SharpPermutation) -> Result<Self> {
-        let state = GraphicsState { depth: Some(DEPTH), ..GraphicsState::plain(LIGHT) };
+        let state = GraphicsState { depth: Some(DEPTH), second: Some(SEEN), ..GraphicsState::plain(SEEN) };
         let maker = PipelineMaker { device: device.clone(), library: library.clone(), state };
-        Self::of(Arc::new(LightPipelines { maker, sharp, made: Default::default() }), size)
+        let compute = |row: &ShaderPermutation| ComputePipeline::new(device, "pixel light", &library.shader(row)?);
+        let pipelines = LightPipelines {
+            maker,
+            drawn: Default::default(),
+            select: [compute(&Self::select_row(Step::Coarse))?, compute(&Self::select_row(Step::Fine))?],
+            evaluate: compute(&Self::evaluate_row(&sharp))?,
+            none: Buffer::with_data(device, "no pixel work", &[PixelWork::NONE])?,
+        };
+        Self::of(Arc::new(pipelines), size)
     }
 
     /// Others for pictures of `width` x `height`, which share the pipelines.
@@ -208,87 +238,159 @@ impl LightImages {
 
     fn of(pipelines: Arc<LightPipelines>, size: [u32; 2]) -> Result<Self> {
         let device = &pipelines.maker.device;
+        let [width, height] = size;
+        let image = |name, format| Image::new(device, name, ImageShape { format, width, height, samples: 1 });
+        let buffer = |name: &str, bytes: u64| Buffer::new(device, name, BufferKind::Device, bytes);
+        let texels = |texel_px: u32| size.map(|px| u64::from(px.div_ceil(texel_px))).iter().product::<u64>();
         Ok(LightImages {
-            coarse: Layer::new(device, "coarse light", size.map(|px| px.div_ceil(COARSE_PX)))?,
-            fine: Layer::new(device, "pixel light", size)?,
+            seen: [image("seen triangles", SEEN)?, image("seen places", SEEN)?],
+            depth: image("seen depth", DEPTH)?,
+            work: buffer("pixel work", size_of::<PixelWork>() as u64 + 4 * texels(1))?,
+            light: [
+                buffer("coarse light", LIGHT_BYTES * (1 + texels(COARSE_PX)))?,
+                buffer("pixel light", LIGHT_BYTES * (1 + texels(1)))?,
+            ],
             pipelines,
         })
     }
 
     /// Device memory of a pixel, bytes.
     pub fn pixel_bytes() -> u64 {
-        let texel = 16 + 4;
-        texel + texel / u64::from(COARSE_PX * COARSE_PX)
+        let seen = 2 * 16 + 4;
+        let work = 4;
+        seen + work + LIGHT_BYTES + LIGHT_BYTES / u64::from(COARSE_PX * COARSE_PX)
     }
 
     /// The light of pixels, for pass "draw".
-    pub fn light(&self) -> &Image {
-        &self.fine.light
+    pub fn light(&self) -> &Buffer {
+        &self.light[Step::Fine as usize]
     }
 
     /// Makes what is drawn with, on all cores.
     pub fn make(&self, receivers: &[Receiver]) -> Result<()> {
-        let pairs: Vec<(Receiver, Way)> =
-            receivers.iter().flat_map(|of| [(*of, Way::Evaluated), (*of, Way::Interpolated)]).collect();
-        pairs.par_iter().try_for_each(|(receiver, way)| self.pipeline(*receiver, *way).map(|_| ()))
+        receivers.par_iter().try_for_each(|receiver| self.pipeline(*receiver).map(|_| ()))
     }
 
-    fn pipeline(&self, receiver: Receiver, way: Way) -> Result<&GraphicsPipeline> {
-        let LightPipelines { maker, sharp, made } = &*self.pipelines;
-        made_once(&made[receiver.number()][way as usize], || {
-            maker.make("pixel light", &Self::rows(sharp, receiver, way), maker.state)
-        })
+    fn pipeline(&self, receiver: Receiver) -> Result<&GraphicsPipeline> {
+        let LightPipelines { maker, drawn, .. } = &*self.pipelines;
+        made_once(&drawn[receiver.number()], || maker.make("seen surfaces", &Self::rows(receiver), maker.state))
     }
 
-    /// Vertex and fragment shader.
-    pub fn rows(sharp: &SharpPermutation, receiver: Receiver, way: Way) -> [ShaderPermutation; 2] {
-        let grid = matches!(receiver, Receiver::Grid);
-        let holes = matches!(receiver, Receiver::Triangles { holes: true });
-        let row = |file| ShaderPermutation::new(file, 4).define("HOLES", holes).define("SAMPLES", 1_u32);
-        let vertex = match grid {
-            true => row("grid.vert").define("BLOCK_CELLS", BLOCK_CELLS),
-            false => row("triangle.vert"),
-        };
-        let vertex = vertex.define("EVALUATED", matches!(way, Way::Evaluated));
-        let fragment = match way {
-            Way::Evaluated if grid => sharp.pixel_row(row("grid_light.frag"), false),
-            Way::Evaluated => sharp.pixel_row(row("triangle.frag"), sharp.self_shadows),
-            Way::Interpolated => row("coarse_light.frag")
-                .define("GRID", grid)
-                .define("COARSE_PX", COARSE_PX)
-                .define("COARSE_BINDING", COARSE_BINDING)
-                .number("SAME_DEPTH", SAME_DEPTH)
-                .number("MOST_CHANGE", MOST_CHANGE)
-                .number("LEAST_WHOLE", LEAST_WHOLE),
-        };
-        [vertex, fragment]
+    /// Vertex and fragment shader that draw what pixels show.
+    pub fn rows(receiver: Receiver) -> [ShaderPermutation; 2] {
+        let row = |file| ShaderPermutation::new(file, 4);
+        match receiver {
+            Receiver::Grid => [row("grid.vert").define("BLOCK_CELLS", BLOCK_CELLS), row("grid_seen.frag")],
+            Receiver::Triangles { holes } => ["triangle.vert", "triangle.frag"]
+                .map(|file| row(file).define("HOLES", holes).define("SAMPLES", 1_u32)),
+        }
     }
 
-    /// Fills the image for the viewports whose pixels evaluate lights.
+    pub fn select_row(step: Step) -> ShaderPermutation {
+        ShaderPermutation::new("select.comp", 4)
+            .define("COARSE", matches!(step, Step::Coarse))
+            .define("COARSE_PX", COARSE_PX)
+            .define("BLOCK_X", SELECTED_BLOCK[0])
+            .define("BLOCK_Y", SELECTED_BLOCK[1])
+            .number("SAME_DEPTH", SAME_DEPTH)
+            .number("MOST_CHANGE", MOST_CHANGE)
+            .number("LEAST_WHOLE", LEAST_WHOLE)
+    }
+
+    pub fn evaluate_row(sharp: &SharpPermutation) -> ShaderPermutation {
+        sharp.pixel_row(ShaderPermutation::new("pixel_light.comp", 4))
+    }
+
+    /// Finds the light of pixels in the viewports whose pixels evaluate lights.
     pub fn record<'r>(&'r self, commands: &mut Commands<'r>, viewports: &[DrawnViewport<'r>]) -> Result<()> {
-        commands.count_samples()?;
-        self.coarse.render(commands, |drawing| self.draw(drawing, viewports, Way::Evaluated, COARSE_PX))?;
-        self.fine.render(commands, |drawing| {
-            self.draw(drawing, viewports, Way::Interpolated, 1)?;
-            // What was interpolated lies as near, and stays.
-            drawing.counted(|drawing| self.draw(drawing, viewports, Way::Evaluated, 1))
-        })
-    }
-
-    /// Draws marked triangles of all receivers into an image whose texels are `texel_px` pixels wide.
-    fn draw<'r>(
-        &'r self,
-        drawing: &mut Drawing<'_, 'r>,
-        viewports: &[DrawnViewport<'r>],
-        way: Way,
-        texel_px: u32,
-    ) -> Result<()> {
+        let images = self.seen.each_ref().map(|seen| (seen, Access::ColorWrite));
+        let images = images.into_iter().chain([(&self.depth, Access::DepthWrite)]);
+        images.clone().for_each(|(image, access)| commands.image_barrier(image, None, access));
+        let [color, second] = self.seen.each_ref();
+        let target = Target {
+            color,
+            second: Some(second),
+            clear: Some([0.0; 4]),
+            depth: Some(&self.depth),
+            resolve: None,
+        };
+        commands.render(&target, |drawing| self.draw(drawing, viewports))?;
+        images.for_each(|(image, access)| commands.image_barrier(image, Some(access), Access::ComputeSampled));
+        let none = &self.pipelines.none;
+        commands.copy_range(none, 0..none.size_bytes, &self.work, 0);
+        commands.barrier(Access::TransferWrite, Access::ComputeWrite);
+        let mut is_first = true;
         for viewport in viewports {
             let Some(light) = &viewport.pixel else { continue };
-            drawing.part_of(viewport.area, viewport.drawn, texel_px);
+            if !is_first {
+                // The steps begin anew; the sum of all pixels goes on.
+                let steps = PixelWork::STEPS_AT..none.size_bytes;
+                commands.barrier(Access::ComputeWrite, Access::TransferWrite);
+                commands.barrier(Access::ComputeWrite, Access::ComputeWrite);
+                commands.barrier(Access::Indirect, Access::TransferWrite);
+                commands.copy_range(none, steps, &self.work, PixelWork::STEPS_AT);
+                commands.barrier(Access::TransferWrite, Access::ComputeWrite);
+            }
+            is_first = false;
+            self.evaluate(commands, viewport, light, Step::Coarse)?;
+            commands.barrier(Access::ComputeWrite, Access::ComputeRead);
+            commands.barrier(Access::ComputeWrite, Access::ComputeWrite);
+            commands.barrier(Access::Indirect, Access::ComputeWrite);
+            self.evaluate(commands, viewport, light, Step::Fine)?;
+        }
+        commands.barrier(Access::ComputeWrite, Access::GraphicsSampled);
+        Ok(())
+    }
+
+    /// Has the pass tell how many pixels it has evaluated.
+    pub fn count<'r>(&'r self, commands: &mut Commands<'r>) -> Result<()> {
+        commands.barrier(Access::ComputeWrite, Access::TransferRead);
+        commands.count(&self.work, 0)
+    }
+
+    /// Lists the places of a step in a viewport, and evaluates them.
+    fn evaluate<'r>(
+        &'r self,
+        commands: &mut Commands<'r>,
+        viewport: &DrawnViewport<'r>,
+        light: &PixelLight<'r>,
+        step: Step,
+    ) -> Result<()> {
+        let [seen, places] = self.seen.each_ref().map(Bind::Image);
+        let depth = Bind::Image(&self.depth);
+        let [coarse, _] = &self.light;
+        let found = &self.light[step as usize];
+        let work = Bind::Buffer(&self.work);
+        let ImageShape { width: picture_width, height: picture_height, .. } = self.depth.shape;
+        let push = SelectPush { part: viewport.drawn, size: [picture_width, picture_height], spare: [0; 2] };
+        let resources =
+            [seen.clone(), places.clone(), depth.clone(), work.clone(), Bind::Buffer(found), Bind::Buffer(coarse)];
+        // Eight by eight blocks of places make a workgroup of 64, from the place that holds the first pixel.
+        let [left, top, width, height] = viewport.drawn;
+        let texel_px = step.texel_px();
+        let count = |first: u32, size: u32| (first + size).div_ceil(texel_px) - first / texel_px;
+        let [across, down] = SELECTED_BLOCK;
+        let elements = [64 * count(left, width).div_ceil(8 * across), count(top, height).div_ceil(8 * down), 1];
+        commands.dispatch(&self.pipelines.select[step as usize], &resources, &push, elements)?;
+        commands.barrier(Access::ComputeWrite, Access::ComputeRead);
+        commands.barrier(Access::ComputeWrite, Access::ComputeWrite);
+        commands.barrier(Access::ComputeWrite, Access::Indirect);
+        let mut binds = light.binds(viewport.radiosity)?;
+        binds.splice(11..14, [seen, places, depth]);
+        binds.extend([work, Bind::Buffer(found)]);
+        let push = EvaluatePush { list: step as u32, texel_px, width: picture_width.div_ceil(texel_px) };
+        let groups = (&self.work, PixelWork::STEPS_AT + PixelWork::STEP_BYTES * step as u64);
+        commands.dispatch_indirect(&self.pipelines.evaluate, &binds, &push, groups)
+    }
+
+    /// Draws marked triangles of all receivers.
+    fn draw<'r>(&'r self, drawing: &mut Drawing<'_, 'r>, viewports: &[DrawnViewport<'r>]) -> Result<()> {
+        for viewport in viewports {
+            let Some(light) = &viewport.pixel else { continue };
+            drawing.part_of(viewport.area, viewport.drawn);
             for entity in viewport.entities.iter().filter(|entity| !entity.indices.is_empty()) {
                 if let Some(by_pixel) = entity.by_pixel {
-                    self.draw_entity(drawing, viewport, light, entity, by_pixel, way)?;
+                    self.draw_entity(drawing, viewport, light, entity, by_pixel)?;
                 }
             }
         }
@@ -302,26 +404,20 @@ impl LightImages {
         light: &PixelLight<'r>,
         entity: &DrawnEntity<'r>,
         by_pixel: ByPixel,
-        way: Way,
     ) -> Result<()> {
-        let pipeline = self.pipeline(Receiver::of(entity), way)?;
+        let pipeline = self.pipeline(Receiver::of(entity))?;
         let clip_from_object = entity.clip_from_object.to_cols_array();
-        let first = (entity.radiosity_offset / 16) as u32;
+        let radiosity = (viewport.radiosity, QUAD_FORMAT);
         match entity.mesh {
             DrawnMesh::Grid(grid, _) => {
                 let [positions, places, indices] = &grid.patches;
-                let corners = [(positions, 0), (places, 0)];
-                let count = if matches!(way, Way::Evaluated) { 2 } else { 1 };
-                drawing.bind(pipeline, &corners[..count], indices);
-                drawing.resources(&self.binds(viewport, light, (&grid.corners, grid::QUADS), None)?)?;
+                drawing.bind(pipeline, &[(positions, 0), (places, 0)], indices);
+                drawing.resources(&texels(&[(&grid.corners, grid::QUADS), radiosity])?)?;
                 drawing.push(&GridPush {
                     clip_from_object,
                     cells: grid.cells,
-                    first,
+                    first: by_pixel.lit_first,
                     receiver: entity.index,
-                    cluster_first: by_pixel.cluster_first,
-                    spare: [0; 3],
-                    normal: grid.normal.extend(0.0).to_array(),
                 });
                 drawing.indexed(0..grid.patch_indices);
             }
@@ -329,15 +425,18 @@ impl LightImages {
                 let mask = mask(entity, mesh);
                 drawing.bind(pipeline, &[], &mesh.indices);
                 drawing.cull(entity.culls);
-                let corners = (&mesh.indices, vk::Format::R32_UINT);
-                drawing.resources(&self.binds(viewport, light, corners, mask)?)?;
+                let indices = (&mesh.indices, vk::Format::R32_UINT);
+                let mut binds = texels(&[indices, radiosity, (light.vertices, QUAD_FORMAT)])?;
+                if let Some((paint, buffer)) = mask {
+                    binds.extend(texels(&[(buffer, vk::Format::R32_UINT)])?);
+                    binds.push(Bind::Texture(paint.texture));
+                }
+                drawing.resources(&binds)?;
                 drawing.push(&TrianglePush {
                     clip_from_object,
-                    first,
+                    first: by_pixel.lit_first,
                     receiver: entity.index,
-                    cluster_first: by_pixel.cluster_first,
                     vertex_first: by_pixel.vertex_first,
-                    self_first: by_pixel.self_first,
                     alpha_cutoff: mask.map_or(0.0, |(paint, _)| paint.alpha_cutoff),
                 });
                 entity.indices.iter().for_each(|range| drawing.corners(range.clone()));
@@ -345,38 +444,30 @@ impl LightImages {
         }
         Ok(())
     }
+}
 
-    /// All bindings of all of its shaders.
-    fn binds<'r>(
-        &'r self,
-        viewport: &DrawnViewport<'r>,
-        light: &PixelLight<'r>,
-        corners: (&'r Buffer, vk::Format),
-        mask: Option<(DrawnPaint<'r>, &'r Buffer)>,
-    ) -> Result<Vec<Bind<'r>>> {
-        let [nodes, cells] = light.silhouettes;
+impl<'d> PixelLight<'d> {
+    /// What evaluation binds, with room for the images of what is seen.
+    fn binds(&self, radiosity: &'d Buffer) -> Result<Vec<Bind<'d>>> {
+        let [nodes, cells] = self.silhouettes;
         let pairs = vk::Format::R32G32_UINT;
         let mut binds = texels(&[
-            corners,
-            (viewport.radiosity, QUAD_FORMAT),
-            (light.entities, QUAD_FORMAT),
+            (self.receivers, grid::QUADS),
+            (radiosity, QUAD_FORMAT),
+            (self.entities, QUAD_FORMAT),
             (nodes, QUAD_FORMAT),
             (cells, pairs),
-            (light.entries, vk::Format::R32_UINT),
-            (light.chains, pairs),
-            (light.soft, QUAD_FORMAT),
-            (light.vertices, QUAD_FORMAT),
+            (self.entries, vk::Format::R32_UINT),
+            (self.chains, pairs),
+            (self.soft, QUAD_FORMAT),
+            (self.vertices, QUAD_FORMAT),
         ])?;
-        let texel = |buffer: &'r Buffer, format| TexelView::new(buffer, format).map(Bind::Texel);
-        binds.push(light.shown.map_or(Ok(Bind::None), |[lights, _]| texel(lights, grid::QUADS))?);
-        binds.push(texel(light.self_cells, pairs)?);
-        match mask {
-            Some((paint, buffer)) => binds.extend([texel(buffer, vk::Format::R32_UINT)?, Bind::Texture(paint.texture)]),
-            None => binds.extend([Bind::None, Bind::None]),
-        }
-        binds.push(Bind::Image(&self.coarse.light));
-        binds.push(texel(light.irradiances, vk::Format::R32_SFLOAT)?);
-        binds.push(light.shown.map_or(Ok(Bind::None), |[_, shares]| texel(shares, grid::QUADS))?);
+        let texel = |buffer: &'d Buffer, format| TexelView::new(buffer, format).map(Bind::Texel);
+        binds.push(self.shown.map_or(Ok(Bind::None), |[lights, _]| texel(lights, grid::QUADS))?);
+        binds.push(texel(self.self_cells, pairs)?);
+        binds.extend([Bind::None, Bind::None, Bind::None]);
+        binds.push(texel(self.irradiances, pairs)?);
+        binds.push(self.shown.map_or(Ok(Bind::None), |[_, shares]| texel(shares, grid::QUADS))?);
         Ok(binds)
     }
 }

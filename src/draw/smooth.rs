@@ -146,7 +146,7 @@ impl Smooth {
         commands.copy_between(picture, &self.picture);
         commands.image_barrier(&self.picture, Some(Access::TransferWrite), Access::ColorWrite);
         commands.image_barrier(picture, Some(Access::TransferRead), Access::GraphicsSampled);
-        let target = Target { color: &self.picture, clear: None, depth: None, resolve: None };
+        let target = Target { color: &self.picture, second: None, clear: None, depth: None, resolve: None };
         commands.render(&target, |drawing| {
             drawing.bind(&self.pipeline, &[(&lines.corners, 0), (&lines.marks, 0)], &lines.indices);
             drawing.resources(&[Bind::Image(picture), Bind::Image(depth)])?;

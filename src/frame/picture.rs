@@ -171,6 +171,7 @@ impl Frame {
         let chains = self.chains.as_ref().filter(|chains| chains.is_ready())?;
         let (irradiances, _) = self.radiosity.irradiances()?;
         self.picture.draw.evaluates_pixels().then(|| PixelLight {
+            receivers: &chains.receivers,
             entities: &chains.entities,
             silhouettes: [&self.buffers.silhouettes.nodes, &self.buffers.silhouettes.cells],
             entries: &chains.entries,

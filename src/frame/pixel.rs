@@ -3,7 +3,8 @@
 use crate::draw::DrawnMesh;
 use crate::draw::pixel_light::ByPixel;
 use crate::error::Result;
-use crate::gpu::{Device, TexelView, Upload};
+use crate::frame::radiosity::RadiosityBuffers;
+use crate::gpu::{Buffer, Device, TexelView, Upload};
 use crate::layout::{self, CLUSTER_VERTICES, ENTRY_FORMAT, QUAD_FORMAT};
 use crate::lists::gather::EntityBounds;
 use crate::lists::incremental::{ClusterLists, State};
@@ -21,18 +22,21 @@ pub(super) struct PixelChains {
     pub chains: Upload,
     /// For every lit entity: where its pixels find their data, and how far the pixels of a cluster may lie from its
     /// vertices, metres of the mesh's frame. `None` for the others.
-    receivers: Vec<Option<(ByPixel, f32)>>,
+    lit: Vec<Option<(ByPixel, f32)>>,
+    /// The first of these of every entity.
+    pub receivers: Buffer,
     /// Entities as they were when the chains were made, and their bounds with what each of them takes part in.
     known: Option<(Vec<layout::DeviceEntity>, Vec<EntityBounds>)>,
 }
 
 impl PixelChains {
     /// Empty chains for the lit entities of a scene.
-    pub fn new(device: &Arc<Device>, scene: &Scene, buffers: &SceneBuffers) -> Result<Self> {
+    pub fn new(device: &Arc<Device>, scene: &Scene, buffers: &SceneBuffers, radiosity: &RadiosityBuffers) -> Result<Self> {
         // All pixels bind them, also those that read none.
         let maps_fit = TexelView::fits(device, vk::Format::R32G32_UINT, buffers.self_cells.size_bytes);
         let mut clusters = 0;
         let mut receivers = Vec::with_capacity(scene.entities.len());
+        let mut lit = Vec::with_capacity(scene.entities.len());
         for (index, entity) in scene.entities.iter().enumerate() {
             let surface = buffers.surface(index);
             let fits = match &surface.drawn {
@@ -40,13 +44,15 @@ impl PixelChains {
                 DrawnMesh::Triangles(triangles) => triangles.fits_views(device, &buffers.vertices),
             };
             let by_pixel = ByPixel {
+                lit_first: (radiosity.offsets[index] / 16) as u32,
                 cluster_first: clusters,
                 vertex_first: surface.vertices.start,
                 self_first: surface.self_first,
             };
-            let lit = entity.receives && maps_fit && fits && !entity.transparent;
-            receivers.push(lit.then_some((by_pixel, surface.reach_m)));
-            clusters += if lit { (surface.vertices.len() as u32).div_ceil(CLUSTER_VERTICES) } else { 0 };
+            let is_lit = entity.receives && maps_fit && fits && !entity.transparent;
+            receivers.push(by_pixel);
+            lit.push(is_lit.then_some((by_pixel, surface.reach_m)));
+            clusters += if is_lit { (surface.vertices.len() as u32).div_ceil(CLUSTER_VERTICES) } else { 0 };
         }
         let entity_count = scene.entities.len() + scene.boxes().len();
         let upload = |name: &str, bytes: usize| Upload::new(device, name, bytes as u64);
@@ -54,14 +60,15 @@ impl PixelChains {
             entities: upload("pixel entities", entity_count * size_of::<layout::DeviceEntity>())?,
             entries: upload("pixel entries", 16)?,
             chains: upload("pixel chains", 8 * clusters.max(1) as usize)?,
-            receivers,
+            lit,
+            receivers: Buffer::with_data(device, "pixel receivers", &receivers)?,
             known: None,
         })
     }
 
     /// Where the pixels of an entity find what they need, if they evaluate lights.
     pub fn of(&self, entity: usize) -> Option<ByPixel> {
-        self.receivers[entity].map(|(by_pixel, _)| by_pixel)
+        self.lit[entity].map(|(by_pixel, _)| by_pixel)
     }
 
     /// Whether chains have been made that pixels can read: a device's texel views may be too short for them, and then
@@ -86,7 +93,7 @@ impl PixelChains {
         }
         let mut entries = Vec::new();
         let mut chains = Vec::new();
-        for (receiver, reach_m) in self.receivers.iter().enumerate().filter_map(|(i, lit)| Some((i, (*lit)?.1))) {
+        for (receiver, reach_m) in self.lit.iter().enumerate().filter_map(|(i, lit)| Some((i, (*lit)?.1))) {
             let (places, listed) = lists.sharp_chains(receiver, reach_m);
             chains.extend(places.iter().map(|[first, count]| [first + entries.len() as u32, *count]));
             entries.extend(listed);

@@ -116,7 +116,7 @@ impl Frame {
         }
         let chains = match &mut self.chains {
             Some(chains) => chains,
-            none => none.insert(PixelChains::new(&self.device, &self.scene, &self.buffers)?),
+            none => none.insert(PixelChains::new(&self.device, &self.scene, &self.buffers, &self.radiosity)?),
         };
         chains.prepare(&self.work.lists)
     }

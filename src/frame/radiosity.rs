@@ -6,9 +6,10 @@ use crate::error::Result;
 use crate::gpu::{Buffer, BufferKind, Device};
 use crate::scene::{LightMethod, Scene};
 use crate::scene_buffers::SceneBuffers;
+use crate::sharp::KeptIrradiance;
 use std::sync::Arc;
 
-/// Four floats a vertex: linear RGB radiance that leaves the surface, and marks (`glsl/marks.glsl`) or 0. The vertices of
+/// Four floats a vertex: linear RGB radiance that leaves the surface, and 1 where pixels evaluate lights. The vertices of
 /// one entity follow those of another, each in the order of its mesh's [`crate::scene_buffers::DeviceMesh`].
 pub(super) struct RadiosityBuffers {
     pub merged: Buffer,
@@ -36,7 +37,7 @@ struct Direct {
 /// Sharp lights whose irradiances are kept. Pixels evaluate those beyond wherever they evaluate any.
 const MOST_KEPT_LIGHTS: usize = 64;
 
-/// Irradiance of every vertex by each of the first sharp lights, a float each: of one light on all vertices, then of the
+/// Irradiance of every vertex by each of the first sharp lights ([`KeptIrradiance`]): of one light on all vertices, then of the
 /// next. Zero where it is dark, and below where pixels around the vertex have to evaluate the light.
 struct Irradiances {
     buffer: Buffer,
@@ -81,12 +82,12 @@ impl RadiosityBuffers {
         let is_kept = |&light: &usize| scene.entities[light].emits && methods[light].is_sharp() && !has_colors(light);
         let device = self.merged.device();
         let limits = &device.limits;
-        let bound = limits.max_texel_buffer_elements.min(limits.max_storage_buffer_range / 4);
+        let bound = limits.max_texel_buffer_elements.min(limits.max_storage_buffer_range / size_of::<KeptIrradiance>() as u32);
         let vertices = self.merged.size_bytes / 16;
         let most = (u64::from(bound) / vertices) as usize;
         let lights = (0..scene.entities.len()).filter(is_kept);
         let lights: Vec<usize> = lights.take(most.min(MOST_KEPT_LIGHTS)).collect();
-        let size_bytes = (lights.len() as u64 * 4 * vertices).max(4);
+        let size_bytes = (lights.len() as u64 * vertices).max(1) * size_of::<KeptIrradiance>() as u64;
         let buffer = Buffer::zeros(device, "irradiances", size_bytes)?;
         self.irradiances = Some(Irradiances { buffer, lights });
         Ok(())

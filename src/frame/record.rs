@@ -96,10 +96,14 @@ pub fn record<'f>(
         commands.computed();
         commands.pass("gloss", |c| reflections.record(c, inputs))?;
     }
-    if (merge.is_some() || gloss.is_some()) && picture.is_some() {
-        // Triangles read the radiosity as a vertex attribute, grids look it up in the fragment shader.
+    if let Some(picture) = picture.filter(|_| merge.is_some() || gloss.is_some()) {
+        // Triangles read the radiosity as a vertex attribute, grids look it up in the fragment shader, and what evaluates
+        // pixels does in a compute shader.
         commands.barrier(Access::ComputeWrite, Access::VertexRead);
         commands.barrier(Access::ComputeWrite, Access::GraphicsSampled);
+        if picture.viewports.iter().chain(&picture.mirrored).any(|viewport| viewport.pixel.is_some()) {
+            commands.barrier(Access::ComputeWrite, Access::ComputeSampled);
+        }
     }
     if let Some(PictureWork { draw, viewports, mirrored, background, white, lines, .. }) = picture {
         if let Some(mirrors) = &draw.mirrors {
@@ -109,7 +113,11 @@ pub fn record<'f>(
             commands.image_barrier(image, None, access);
         }
         if let Some(light) = draw.pixel_light(viewports) {
-            commands.pass("pixel light", |c| light.record(c, viewports))?;
+            let counts = matches!(target, PictureTarget::Host { .. });
+            commands.pass("pixel light", |c| {
+                light.record(c, viewports)?;
+                if counts { light.count(c) } else { Ok(()) }
+            })?;
         }
         commands.pass("draw", |c| draw.record(c, viewports, background.extend(1.0), *white))?;
         if let Some(smooth) = &draw.smooth {
@@ -135,7 +143,7 @@ pub fn record<'f>(
         }
         PictureTarget::Screen { image, clear, show, next } => {
             commands.image_barrier(image, None, Access::ColorWrite);
-            let color = gpu::Target { color: image, clear: Some(clear), depth: None, resolve: None };
+            let color = gpu::Target { color: image, second: None, clear: Some(clear), depth: None, resolve: None };
             commands.pass("show", |c| c.render(&color, show))?;
             commands.image_barrier(image, Some(Access::ColorWrite), next);
         }

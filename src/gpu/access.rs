@@ -24,7 +24,9 @@ pub enum Access {
     ComputeWrite,
     /// A compute shader reads a texel buffer or a sampled image.
     ComputeSampled,
-    /// A vertex or fragment shader reads an image or a texel buffer with `texelFetch`.
+    /// The device reads how many workgroups to run.
+    Indirect,
+    /// A vertex or fragment shader reads an image or a texel buffer with `texelFetch`, or a storage block.
     GraphicsSampled,
     /// Vertex attributes and indices.
     VertexRead,
@@ -45,6 +47,7 @@ impl Access {
             Access::HostRead => Stage::HOST,
             Access::TransferRead | Access::TransferWrite => Stage::ALL_TRANSFER,
             Access::ComputeRead | Access::ComputeWrite | Access::ComputeSampled => Stage::COMPUTE_SHADER,
+            Access::Indirect => Stage::DRAW_INDIRECT,
             Access::GraphicsSampled => Stage::VERTEX_SHADER | Stage::FRAGMENT_SHADER,
             Access::VertexRead => Stage::VERTEX_INPUT,
             Access::ColorWrite => Stage::COLOR_ATTACHMENT_OUTPUT,
@@ -63,7 +66,9 @@ impl Access {
             Access::TransferWrite => Mask::TRANSFER_WRITE,
             Access::ComputeRead => Mask::SHADER_STORAGE_READ | Mask::UNIFORM_READ,
             Access::ComputeWrite => Mask::SHADER_STORAGE_READ | Mask::SHADER_STORAGE_WRITE,
-            Access::ComputeSampled | Access::GraphicsSampled => Mask::SHADER_SAMPLED_READ,
+            Access::Indirect => Mask::INDIRECT_COMMAND_READ,
+            Access::ComputeSampled => Mask::SHADER_SAMPLED_READ,
+            Access::GraphicsSampled => Mask::SHADER_SAMPLED_READ | Mask::SHADER_STORAGE_READ,
             Access::VertexRead => Mask::VERTEX_ATTRIBUTE_READ | Mask::INDEX_READ,
             Access::ColorWrite => Mask::COLOR_ATTACHMENT_READ | Mask::COLOR_ATTACHMENT_WRITE,
             Access::DepthWrite => Mask::DEPTH_STENCIL_ATTACHMENT_READ | Mask::DEPTH_STENCIL_ATTACHMENT_WRITE,

@@ -87,9 +87,24 @@ impl<'r> Commands<'r> {
         outcome
     }
 
-    /// Lets [`super::Drawing::counted`] count in this recording, on devices that count exactly. Outside a render pass.
-    pub fn count_samples(&mut self) -> Result<()> {
-        if self.recording.device.info.counts_samples { self.recording.count_samples() } else { Ok(()) }
+    /// Has this pass's [`super::Timing`] tell a number that it has left in a word of a buffer, at a byte offset.
+    pub fn count(&mut self, buffer: &'r Buffer, offset_bytes: u64) -> Result<()> {
+        let pass = self.pass_name();
+        self.tracker.use_range(buffer.id, &buffer.name, offset_bytes..offset_bytes + 4, Access::TransferRead, &pass);
+        let (counts, at) = self.recording.next_count()?;
+        let regions = [vk::BufferCopy { src_offset: offset_bytes, dst_offset: at, size: 4 }];
+        let (handle, commands) = self.raw();
+        // SAFETY: the buffer is borrowed until the commands have run, and the recording keeps the other.
+        unsafe { handle.cmd_copy_buffer(commands, buffer.raw(), counts, &regions) };
+        let [from, to] = [Access::TransferWrite, Access::HostRead];
+        self.memory_barrier(
+            vk::MemoryBarrier2::default()
+                .src_stage_mask(from.stage())
+                .src_access_mask(from.mask())
+                .dst_stage_mask(to.stage())
+                .dst_access_mask(to.mask()),
+        );
+        Ok(())
     }
 
     /// Writes a timestamp when all commands before it have finished.
@@ -206,6 +221,28 @@ impl<'r> Commands<'r> {
         unsafe {
             handle.cmd_bind_pipeline(buffer, vk::PipelineBindPoint::COMPUTE, pipeline.raw());
             handle.cmd_dispatch(buffer, groups[0], groups[1], groups[2]);
+        }
+        Ok(())
+    }
+
+    /// Runs as many workgroups as three words at a byte offset of a buffer say.
+    pub fn dispatch_indirect<P: Pod>(
+        &mut self,
+        pipeline: &'r ComputePipeline,
+        resources: &[Bind<'r>],
+        push: &P,
+        groups: (&'r Buffer, u64),
+    ) -> Result<()> {
+        self.bind(&pipeline.layout, &pipeline.name, vk::PipelineBindPoint::COMPUTE, resources)?;
+        self.push(&pipeline.layout, &pipeline.name, push);
+        let (buffer, offset) = groups;
+        let pass = self.pass_name();
+        self.tracker.use_range(buffer.id, &buffer.name, offset..offset + 12, Access::Indirect, &pass);
+        let (handle, commands) = self.raw();
+        // SAFETY: pipeline, resources and the buffer are borrowed until the commands have run; the words lie within it.
+        unsafe {
+            handle.cmd_bind_pipeline(commands, vk::PipelineBindPoint::COMPUTE, pipeline.raw());
+            handle.cmd_dispatch_indirect(commands, buffer.raw(), offset);
         }
         Ok(())
     }

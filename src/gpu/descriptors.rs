@@ -93,6 +93,7 @@ impl<'r> Commands<'r> {
                     let size = range.end - range.start;
                     let access = match (binding.kind, binding.writes) {
                         (Kind::STORAGE_BUFFER, true) => Access::ComputeWrite,
+                        (Kind::STORAGE_BUFFER, false) if graphics => Access::GraphicsSampled,
                         _ => Access::ComputeRead,
                     };
                     self.tracker.use_range(buffer.id, &buffer.name, range.clone(), access, &pass);

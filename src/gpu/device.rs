@@ -102,11 +102,9 @@ impl Device {
             [vk::DeviceQueueCreateInfo::default().queue_family_index(queue_family).queue_priorities(&priorities)];
         let mut core_1_3 = required_features();
         let extension_names: Vec<_> = swapchain.iter().map(|name| name.as_ptr()).collect();
-        let features = vk::PhysicalDeviceFeatures::default().occlusion_query_precise(info.counts_samples);
         let create = vk::DeviceCreateInfo::default()
             .queue_create_infos(&queues)
             .enabled_extension_names(&extension_names)
-            .enabled_features(&features)
             .push_next(&mut core_1_3);
         // SAFETY: the features were checked in `physical_devices`; destroyed in `Drop`, before the instance.
         let handle =

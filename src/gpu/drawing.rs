@@ -14,6 +14,8 @@ use std::ops::Range;
 /// Attachments of a render pass. A multisampled colour image is resolved into `resolve` if that is given.
 pub struct Target<'r> {
     pub color: &'r Image,
+    /// A second colour image, which the fragment shader's second output goes to; what it held is lost.
+    pub second: Option<&'r Image>,
     /// Colour that it is cleared to; `None` keeps its content.
     pub clear: Option<[f32; 4]>,
     /// Depth attachment, cleared to 0 (infinitely far in reversed depth). It is stored if it has one sample per pixel.
@@ -72,7 +74,11 @@ impl<'r> Commands<'r> {
                 })
                 .clear_value(vk::ClearValue { depth_stencil: vk::ClearDepthStencilValue { depth: 0.0, stencil: 0 } })
         });
-        let colors = [color];
+        let mut colors = vec![color];
+        if let Some(second) = target.second {
+            self.tracker.use_image(second.id, &second.name, Access::ColorWrite, &pass);
+            colors.push(color.image_view(second.view()).load_op(vk::AttachmentLoadOp::DONT_CARE));
+        }
         let extent = vk::Extent2D { width: shape.width, height: shape.height };
         let mut info = vk::RenderingInfo::default()
             .render_area(vk::Rect2D { offset: vk::Offset2D::default(), extent })
@@ -150,45 +156,19 @@ impl<'r> Drawing<'_, 'r> {
         self.commands.bind(&pipeline.layout, &pipeline.name, vk::PipelineBindPoint::GRAPHICS, resources)
     }
 
-    /// Counts the samples that `record` draws, once a pass; its [`super::Timing`] holds the number. Nothing is counted
-    /// without [`Commands::count_samples`] before, or by a device that cannot count exactly.
-    pub fn counted(&mut self, record: impl FnOnce(&mut Self) -> Result<()>) -> Result<()> {
-        let recording = &mut self.commands.recording;
-        if recording.samples == vk::QueryPool::null() {
-            return record(self);
-        }
-        let query = recording.passes.len() as u32 - 1;
-        assert!(!recording.counted.contains(&query), "{}: a pass counts once", recording.name);
-        recording.counted.push(query);
-        let samples = recording.samples;
-        let (handle, buffer) = self.commands.raw();
-        // SAFETY: for both calls, the command buffer is recording inside a render pass, and the query was reset before
-        // it.
-        unsafe { handle.cmd_begin_query(buffer, samples, query, vk::QueryControlFlags::PRECISE) };
-        let outcome = record(self);
-        let (handle, buffer) = self.commands.raw();
-        // SAFETY: begun above.
-        unsafe { handle.cmd_end_query(buffer, samples, query) };
-        outcome
-    }
-
     /// Sets viewport and scissor to a rectangle in pixels: left, top, width and height.
     pub fn area(&mut self, area: [u32; 4]) {
-        self.part_of(area, area, 1);
+        self.part_of(area, area);
     }
 
-    /// Sets the viewport to an area and the scissor to a part of it, both in pixels, for a target each of whose texels is
-    /// `texel_px` pixels wide.
-    pub fn part_of(&mut self, area: [u32; 4], part: [u32; 4], texel_px: u32) {
-        let [x, y, width, height] = area.map(|px| px as f32 / texel_px as f32);
+    /// Sets the viewport to an area and the scissor to a part of it, both in pixels.
+    pub fn part_of(&mut self, area: [u32; 4], part: [u32; 4]) {
+        let [x, y, width, height] = area.map(|px| px as f32);
         let viewport = vk::Viewport { x, y, width, height, min_depth: 0.0, max_depth: 1.0 };
         let (handle, buffer) = self.commands.raw();
         // SAFETY: the command buffer is recording.
         unsafe { handle.cmd_set_viewport(buffer, 0, &[viewport]) };
-        let [x, y, width, height] = part;
-        let [left, top] = [x / texel_px, y / texel_px];
-        let [right, bottom] = [(x + width).div_ceil(texel_px), (y + height).div_ceil(texel_px)];
-        self.clip([left, top, right - left, bottom - top]);
+        self.clip(part);
     }
 
     pub fn clip(&mut self, [x, y, width, height]: [u32; 4]) {

@@ -5,6 +5,7 @@
 
 use super::Checked;
 use super::device::Device;
+use super::memory::{Buffer, BufferKind};
 use crate::error::Result;
 use ash::vk;
 use std::sync::{Arc, MutexGuard};
@@ -20,8 +21,8 @@ pub struct Timing {
     pub pass: String,
     /// Milliseconds between the timestamps around it.
     pub milliseconds: f64,
-    /// Samples that its counted draws wrote, see [`super::Drawing::counted`]; `None` where it has none.
-    pub samples: Option<u64>,
+    /// The number that it has counted, see [`super::Commands::count`]; `None` where it counts nothing.
+    pub counted: Option<u32>,
 }
 
 #[derive(Default)]
@@ -40,10 +41,10 @@ pub(super) struct Recording {
     pub buffer: vk::CommandBuffer,
     fence: vk::Fence,
     pub queries: vk::QueryPool,
-    /// Samples written, one query a pass; null until a pass counts.
-    pub samples: vk::QueryPool,
-    /// Passes whose query was used.
-    pub counted: Vec<u32>,
+    /// A word of every pass, once one of them counts.
+    counts: Option<Buffer>,
+    /// Passes that count.
+    counted: Vec<usize>,
     pub descriptors: Vec<(vk::DescriptorPool, u32)>,
     pub passes: Vec<String>,
     running: bool,
@@ -58,7 +59,7 @@ impl Recording {
             buffer: vk::CommandBuffer::null(),
             fence: vk::Fence::null(),
             queries: vk::QueryPool::null(),
-            samples: vk::QueryPool::null(),
+            counts: None,
             counted: Vec::new(),
             descriptors: Vec::new(),
             passes: Vec::new(),
@@ -93,21 +94,16 @@ impl Recording {
         Ok(recording)
     }
 
-    /// Makes the queries that count samples, if there are none yet. The recording is outside a render pass.
-    pub fn count_samples(&mut self) -> Result<()> {
-        if self.samples != vk::QueryPool::null() {
-            return Ok(());
+    /// Where the current pass's count goes: a buffer and a byte offset.
+    pub fn next_count(&mut self) -> Result<(vk::Buffer, u64)> {
+        let pass = self.passes.len() - 1;
+        self.counted.push(pass);
+        if self.counts.is_none() {
+            self.counts =
+                Some(Buffer::new(&self.device, "counts", BufferKind::Readback, 4 * u64::from(MAX_PASSES))?);
         }
-        let create = vk::QueryPoolCreateInfo::default().query_type(vk::QueryType::OCCLUSION).query_count(MAX_PASSES);
-        // SAFETY: the pool is stored at once and destroyed in `Drop`; the command buffer is recording outside a render
-        // pass.
-        unsafe {
-            let handle = &self.device.handle;
-            self.samples = handle.create_query_pool(&create, None).checked("vkCreateQueryPool", &self.name)?;
-            handle.cmd_reset_query_pool(self.buffer, self.samples, 0, MAX_PASSES);
-        }
-        self.device.name(self.samples, &self.name);
-        Ok(())
+        let counts = self.counts.as_ref().expect("it was made");
+        Ok((counts.raw(), 4 * pass as u64))
     }
 
     fn last_pass(&self) -> String {
@@ -174,7 +170,6 @@ impl Drop for Recording {
                 handle.destroy_descriptor_pool(*pool, None);
             }
             handle.destroy_query_pool(self.queries, None);
-            handle.destroy_query_pool(self.samples, None);
             handle.destroy_fence(self.fence, None);
             handle.destroy_command_pool(self.pool, None);
         }
@@ -205,15 +200,12 @@ impl Flight {
             .map(|(pass, pair)| Timing {
                 pass: pass.clone(),
                 milliseconds: pair[1].saturating_sub(pair[0]) as f64 * period_ns * 1e-6,
-                samples: None,
+                counted: None,
             })
             .collect();
         for &pass in &recording.counted {
-            let mut count = [0_u64];
-            // SAFETY: the pool is alive, and the query was begun and ended in the recording.
-            unsafe { recording.device.handle.get_query_pool_results(recording.samples, pass, &mut count, flags) }
-                .checked("vkGetQueryPoolResults", &recording.name)?;
-            timings[pass as usize].samples = Some(count[0]);
+            let counts = recording.counts.as_ref().expect("a pass that counts has made it");
+            timings[pass].counted = Some(counts.read_finished(4 * pass as u64, 1)[0]);
         }
         Ok(timings)
     }

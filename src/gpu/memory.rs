@@ -83,7 +83,7 @@ impl Drop for Allocation {
     }
 }
 
-/// A buffer with its own memory, usable as storage, uniform, texel, vertex and index buffer and for copies.
+/// A buffer with its own memory, usable as storage, uniform, texel, vertex, index and indirect buffer and for copies.
 pub struct Buffer {
     /// Destroyed before the buffer, which is destroyed before its memory.
     views: Mutex<Vec<(vk::Format, Owned<vk::BufferView>)>>,
@@ -113,6 +113,7 @@ impl Buffer {
                 | Use::UNIFORM_TEXEL_BUFFER
                 | Use::VERTEX_BUFFER
                 | Use::INDEX_BUFFER
+                | Use::INDIRECT_BUFFER
                 | Use::TRANSFER_SRC
                 | Use::TRANSFER_DST,
         );
@@ -187,6 +188,11 @@ impl Buffer {
     /// Waits for all recordings in flight, then copies `count` elements from a byte offset of mapped memory.
     pub fn read<T: Pod>(&self, offset_bytes: u64, count: usize) -> Vec<T> {
         self.device().settle();
+        self.read_finished(offset_bytes, count)
+    }
+
+    /// As [`Buffer::read`] of what no recording in flight writes.
+    pub(super) fn read_finished<T: Pod>(&self, offset_bytes: u64, count: usize) -> Vec<T> {
         let pointer = self.mapped.unwrap_or_else(|| panic!("{} is not visible to the host", self.name));
         let end = offset_bytes + (count * size_of::<T>()) as u64;
         assert!(end <= self.size_bytes, "{}: read to byte {end} of {}", self.name, self.size_bytes);

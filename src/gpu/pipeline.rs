@@ -174,6 +174,8 @@ pub enum Keeps {
 #[derive(Clone, Copy, Debug)]
 pub struct GraphicsState {
     pub color: vk::Format,
+    /// Format of the second colour attachment, if there is one; both keep the same.
+    pub second: Option<vk::Format>,
     /// Depth attachment format. If present, depth is tested and written, and greater is nearer (reversed depth).
     pub depth: Option<vk::Format>,
     pub samples: u32,
@@ -183,7 +185,7 @@ pub struct GraphicsState {
 impl GraphicsState {
     /// One sample of that format without depth: all triangles are drawn, and the last one stays.
     pub fn plain(color: vk::Format) -> Self {
-        GraphicsState { color, depth: None, samples: 1, keeps: Keeps::Last }
+        GraphicsState { color, second: None, depth: None, samples: 1, keeps: Keeps::Last }
     }
 }
 
@@ -232,11 +234,11 @@ impl GraphicsPipeline {
                 Keeps::ColorOver => vk::CompareOp::GREATER_OR_EQUAL,
                 _ => vk::CompareOp::GREATER,
             });
-        let blend_attachments = [color_blend(state.keeps)];
+        let colors: Vec<vk::Format> = [state.color].into_iter().chain(state.second).collect();
+        let blend_attachments = vec![color_blend(state.keeps); colors.len()];
         let blend = vk::PipelineColorBlendStateCreateInfo::default().attachments(&blend_attachments);
         let dynamic_states = [vk::DynamicState::VIEWPORT, vk::DynamicState::SCISSOR, vk::DynamicState::CULL_MODE];
         let dynamic = vk::PipelineDynamicStateCreateInfo::default().dynamic_states(&dynamic_states);
-        let colors = [state.color];
         let mut rendering = vk::PipelineRenderingCreateInfo::default()
             .color_attachment_formats(&colors)
             .depth_attachment_format(state.depth.unwrap_or(vk::Format::UNDEFINED));

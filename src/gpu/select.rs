@@ -26,8 +26,6 @@ pub struct Candidate {
     pub driver: String,
     /// Device UUID as 32 hexadecimal digits.
     pub uuid: String,
-    /// Whether it counts the samples that a draw writes.
-    pub counts_samples: bool,
     /// Why this device cannot be used, if it cannot.
     pub unsuitable: Option<String>,
 }
@@ -135,7 +133,6 @@ pub(super) fn describe(instance: &ash::Instance, index: usize, physical: vk::Phy
         }
         (properties, instance.get_physical_device_queue_family_properties(physical))
     };
-    let counts_samples = features.features.occlusion_query_precise == vk::TRUE;
     let unsuitable = if properties.api_version < vk::API_VERSION_1_3 {
         Some(format!("supports Vulkan {}, but 1.3 is needed", version_text(properties.api_version)))
     } else if core_1_3.dynamic_rendering == vk::FALSE {
@@ -165,7 +162,6 @@ pub(super) fn describe(instance: &ash::Instance, index: usize, physical: vk::Phy
         api: version_text(properties.api_version),
         driver,
         uuid: identity.device_uuid.iter().map(|byte| format!("{byte:02x}")).collect(),
-        counts_samples,
         unsuitable,
     }
 }
@@ -182,7 +178,6 @@ mod tests {
             api: "1.3.0".into(),
             driver: "test".into(),
             uuid: format!("{index:032x}"),
-            counts_samples: true,
             unsuitable: unsuitable.map(String::from),
         }
     }

@@ -54,9 +54,7 @@ impl Gpu {
         queue_family: u32,
         cache_dir: Option<&Path>,
     ) -> Result<Self> {
-        let mut info = describe(instance, 0, physical);
-        // Precise counts may not have been enabled.
-        info.counts_samples = false;
+        let info = describe(instance, 0, physical);
         if let Some(reason) = &info.unsuitable {
             return Err(Error::Unsupported(format!("{}: {reason}", info.name)));
         }

@@ -4,7 +4,7 @@
 //! vertices (position and normal, object frame, two quads each). A light is cut into parts
 //! ([`crate::field::sub_light`]); in each part the visibilities past all occluders are multiplied. Output: `radiosity`,
 //! as [`crate::merge`] has it, and albedo / pi times the irradiance of sharp lights. Where pixels evaluate lights, the
-//! fourth number holds marks (`glsl/marks.glsl`), and the irradiance by each light is kept.
+//! fourth number tells where they do, and of each light irradiance and occluders are kept ([`KeptIrradiance`]).
 
 pub mod twin;
 
@@ -40,6 +40,10 @@ const EDGE_STEPS: f64 = 1.1;
 /// evaluate: several of those add up. With 1 a gallery of 20 lamps has 0.0022 more FLIP, with this 0.0005, and its pixels
 /// take a tenth longer.
 const BLENDED_MISS: f64 = 0.25;
+
+/// The most that vertices miss of a light, in the same measure: eight steps in the width of a penumbra, past which no more
+/// than the light itself is missed. Of lights with less than 0.3 % of all light there pixels blend all shadows.
+const MOST_MISS: f64 = 64.0;
 
 /// Steps in the width of the narrowest penumbra, of which the square is far from overflow.
 const MOST_STEPS: f64 = 1e4;
@@ -103,17 +107,17 @@ impl SharpPermutation {
         if self.many_shown { SHOWN_LIGHTS as u32 / 4 } else { 1 }
     }
 
-    /// A fragment shader that evaluates sharp lights. It reads everything through texel views.
-    pub fn pixel_row(&self, row: ShaderPermutation, self_shadows: bool) -> ShaderPermutation {
-        SharpPermutation { self_shadows, edges: true, ..*self }.fragment(row)
+    /// A shader that evaluates sharp lights on pixels. It reads everything through texel views.
+    pub fn pixel_row(&self, row: ShaderPermutation) -> ShaderPermutation {
+        SharpPermutation { edges: true, ..*self }.on_pixels(row)
     }
 
     /// A fragment shader that shows highlights of sharp lights, whose shadows it is given.
     pub fn highlight_row(&self, row: ShaderPermutation) -> ShaderPermutation {
-        SharpPermutation { self_shadows: false, edges: false, gloss: false, ..*self }.fragment(row)
+        SharpPermutation { self_shadows: false, edges: false, gloss: false, ..*self }.on_pixels(row)
     }
 
-    fn fragment(self, row: ShaderPermutation) -> ShaderPermutation {
+    fn on_pixels(self, row: ShaderPermutation) -> ShaderPermutation {
         SharpPermutation { reads: Reads::Texels, lamps: false, ..self }
             .shared(row)
             .number("EDGE_REACH", PIXEL_EDGE_REACH)
@@ -159,6 +163,7 @@ impl SharpPermutation {
             ("EDGE_STEPS", EDGE_STEPS),
             ("MOST_STEPS", MOST_STEPS),
             ("BLENDED_MISS", BLENDED_MISS),
+            ("MOST_MISS", MOST_MISS),
             ("NEAR_LIGHT", (NEAR_LIGHT_STEPS / EDGE_STEPS).powi(2)),
             ("MOST_SINE", MOST_SINE),
             ("LIMIT_SINE", LIMIT_SINE),
@@ -195,6 +200,16 @@ impl SharpPermutation {
         [nodes, soft].into_iter().all(|buffer| TexelView::fits(device, quads, buffer.size_bytes))
             && TexelView::fits(device, vk::Format::R32G32_UINT, cells.size_bytes)
     }
+}
+
+/// Light of a vertex by one light of radiance 1, for the pixels around it.
+#[repr(C)]
+#[derive(Clone, Copy, Pod, Zeroable)]
+pub struct KeptIrradiance {
+    /// 0 where it is dark, negative where pixels need to evaluate the light.
+    pub irradiance: f32,
+    /// A bit for occluders that take any of it or whose shadows' edges are near.
+    pub occluders: u32,
 }
 
 /// Everything that the pass reads.

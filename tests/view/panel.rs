@@ -41,7 +41,7 @@ impl Stand {
 
     /// The shapes of one more look at it. Commands of widgets are executed.
     fn turn(&mut self, events: Vec<Event>) -> Vec<egui::epaint::ClippedShape> {
-        let pass = |pass: &str, milliseconds| Timing { pass: pass.to_owned(), milliseconds, samples: None };
+        let pass = |pass: &str, milliseconds| Timing { pass: pass.to_owned(), milliseconds, counted: None };
         let times = |i: usize| ["merge", "sharp", "draw", "show"].map(|name| pass(name, 3.0 + (i % 9) as f64)).to_vec();
         let timings: VecDeque<Vec<Timing>> = (0..120).map(times).collect();
         let progress = TaskProgress { what: "rays".into(), done: 3, all: 9, elapsed: Duration::from_secs(4) };

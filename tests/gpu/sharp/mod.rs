@@ -126,7 +126,7 @@ fn spots_are_lit_as_by_rays() {
 }
 
 /// A picture of a scene, linear RGB, and the pixels that evaluated lights where the device counts them.
-fn picture(gpu: &Gpu, scene: &Scene, shading: Shading) -> (Vec<f32>, Option<u64>) {
+fn picture(gpu: &Gpu, scene: &Scene, shading: Shading) -> (Vec<f32>, Option<u32>) {
     let options = frame::Options {
         shading: Some(shading),
         size: [160, 120],
@@ -135,7 +135,7 @@ fn picture(gpu: &Gpu, scene: &Scene, shading: Shading) -> (Vec<f32>, Option<u64>
     };
     let mut frame = gpu.frame(scene, options);
     let timings = frame.render(&scene.at(0.0), Some(4.0)).unwrap();
-    (frame.picture(), timings.iter().find_map(|timing| timing.samples))
+    (frame.picture(), timings.iter().find_map(|timing| timing.counted))
 }
 
 /// On floors and slabs of few cells pixels show what the vertices of a fine floor show, and the coarse ones' own
@@ -215,7 +215,7 @@ fn pixels_that_nothing_shades_look_as_vertices_show_them() {
     let [(vertices, none), (pixels, evaluated)] =
         [Shading::Vertex, Shading::Pixel].map(|shading| picture(&gpu, &scene, shading));
     let differ = |(a, b): &(&[f32], &[f32])| a.iter().zip(*b).any(|(a, b)| (a - b).abs() > 0.015);
-    let differing = vertices.chunks_exact(3).zip(pixels.chunks_exact(3)).filter(differ).count() as u64;
+    let differing = vertices.chunks_exact(3).zip(pixels.chunks_exact(3)).filter(differ).count() as u32;
     assert_eq!(none, None);
     let few = evaluated.is_none_or(|evaluated| evaluated > 300 && differing < evaluated / 10);
     assert!(few, "{evaluated:?} pixels evaluate the sun, {differing} differ");

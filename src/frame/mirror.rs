@@ -9,7 +9,7 @@ use crate::asset::mesh::Mesh;
 use crate::bounce::Bounces;
 use crate::draw::mirror::{Mirrored, PROBE_ZOOM, REACH, finest_side};
 use crate::draw::triangles::Detail;
-use crate::draw::{DrawnEntity, DrawnViewport, PictureLights};
+use crate::draw::{DrawnViewport, PictureLights};
 use crate::gloss::{PIXEL_ROUGHNESS, brdf};
 use crate::layout::GlossEntity;
 use crate::lists::sight::SightCamera;
@@ -39,6 +39,8 @@ const CLIPPED: f64 = 2.0 * SAME_PLANE;
 const FADE: f64 = 0.2;
 /// Slopes of a mirror's microfacets, in texels at a distance of 1, below which shadows in it have edges that are seen.
 const CRISP_PX: f64 = 12.0;
+/// How far beyond the box of what has a probe things count as within it, in diagonals of the box.
+const WITHIN: f64 = 0.02;
 
 /// A flat face of a glossy entity.
 pub(super) struct Face {
@@ -343,10 +345,17 @@ impl Frame {
         shown.map(mirror).collect()
     }
 
-    /// Whether an entity is to be seen in a probe: neither what has it nor what is within that.
-    fn is_around(&self, probe: &Probe, of: &HashSet<usize>, entity: usize, placement: &Placement) -> bool {
-        let inside = self.centre(entity, placement).distance(probe.centre) + self.radius_m(entity, placement);
-        !of.contains(&entity) && inside > probe.radius_m
+    /// Whether the box around an entity lies in that around another, as a lamp's lining in its shade.
+    fn lies_within(&self, outer: usize, entity: usize, placements: &[Placement]) -> bool {
+        let extent_m = |entity: usize| self.buffers.meshes[self.scene.entities[entity].mesh].extent_m;
+        let [low, high] = extent_m(outer);
+        let beyond = DVec3::splat(WITHIN * low.distance(high));
+        let corners = extent_m(entity);
+        (0..8_usize).all(|corner| {
+            let own = DVec3::from_array(std::array::from_fn(|axis| corners[corner >> axis & 1][axis]));
+            let place = placements[outer].local(placements[entity].point(own));
+            place.cmpge(low - beyond).all() && place.cmple(high + beyond).all()
+        })
     }
 
     /// What an entity reflects of white light where it is seen at a cosine.
@@ -369,9 +378,11 @@ impl Frame {
             let highlights: HashSet<u32> = glossy.flat_map(|glossy| glossy.lights).collect();
             let picture = |(face, camera): (usize, &SightCamera)| {
                 let mut entities = self.drawn_entities(placements, camera);
-                if let Shape::Probe(probe) = &mirror.shape {
-                    let index = |entity: &DrawnEntity<'_>| entity.index as usize;
-                    entities.retain(|entity| self.is_around(probe, &of, index(entity), &placements[index(entity)]));
+                if matches!(mirror.shape, Shape::Probe(_)) {
+                    // Neither what has it nor what is within that.
+                    entities.retain(|entity| {
+                        !of.iter().any(|&outer| self.lies_within(outer, entity.index as usize, placements))
+                    });
                 }
                 for entity in &mut entities {
                     entity.tag = if entity.transparent { entity.tag } else { 1.0 };

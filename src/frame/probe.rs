@@ -14,8 +14,6 @@ const LEAST_OUTWARD: f64 = 0.15;
 /// Six pictures from a place: along x, -x, y and so on.
 pub(super) struct Probe {
     pub centre: DVec3,
-    /// Of the ball around what has it, metres.
-    pub radius_m: f64,
     pub near_m: f64,
     /// Width and height of each picture in texels.
     pub side: u32,
@@ -33,7 +31,7 @@ impl Probe {
             size: [side; 2],
             samples: false,
         };
-        Probe { centre, radius_m, near_m, side, cameras: std::array::from_fn(camera) }
+        Probe { centre, near_m, side, cameras: std::array::from_fn(camera) }
     }
 }
 

@@ -115,9 +115,9 @@ impl Frame {
 
     /// How far a point is from the box around an entity: what of two panes lies in front is nearer, however large.
     fn box_distance_m(&self, mesh: usize, placement: &Placement, point: DVec3) -> f64 {
-        let [low, high] = self.scene.meshes[mesh].extent();
+        let [low, high] = self.buffers.meshes[mesh].extent_m;
         let own = placement.local(point);
-        f64::from(placement.scale) * own.distance(own.clamp(low.as_dvec3(), high.as_dvec3()))
+        f64::from(placement.scale) * own.distance(own.clamp(low, high))
     }
 
     /// What varies the reflectance of an entity. Its vertices are lit by the mean.

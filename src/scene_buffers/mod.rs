@@ -44,6 +44,8 @@ pub struct DeviceMesh {
     /// Centre of the bounding sphere, metres.
     pub centre_m: DVec3,
     pub radius_m: f64,
+    /// Least and largest corner of its box, metres.
+    pub extent_m: [DVec3; 2],
 }
 
 /// A mesh as it is lit and drawn: where its vertices and their own visibility lie. Entities share it where both are
@@ -161,9 +163,15 @@ impl SceneBuffers {
         let (silhouettes, mesh_slots) = Silhouettes::new(device, &baked.meshes, &casters)?;
         let meshes = casters.into_iter().zip(slots).zip(mesh_slots).map(|((caster, [blocked, radiance]), slots)| {
             let (centre, radius_m) = caster.bounding_sphere();
-            let rectangle = caster.rectangle();
-            let radius_m = f64::from(radius_m);
-            DeviceMesh { blocked, radiance, slots, rectangle, centre_m: centre.as_dvec3(), radius_m }
+            DeviceMesh {
+                blocked,
+                radiance,
+                slots,
+                rectangle: caster.rectangle(),
+                centre_m: centre.as_dvec3(),
+                radius_m: f64::from(radius_m),
+                extent_m: caster.extent().map(|corner| corner.as_dvec3()),
+            }
         });
         let meshes = meshes.collect();
         // The vertices are reserved at once. Growing by halves would hold up to three times as much.

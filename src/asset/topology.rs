@@ -261,17 +261,17 @@ fn has_solid_pieces(edges: &[&[HalfEdge]], positions: &[Vec3], triangles: &[[u32
 }
 
 /// Disjoint sets with path halving.
-struct Sets {
+pub(crate) struct Sets {
     parent: Vec<u32>,
     count: usize,
 }
 
 impl Sets {
-    fn new(count: usize) -> Self {
+    pub(crate) fn new(count: usize) -> Self {
         Self { parent: (0..count as u32).collect(), count }
     }
 
-    fn root(&mut self, mut i: usize) -> usize {
+    pub(crate) fn root(&mut self, mut i: usize) -> usize {
         while self.parent[i] as usize != i {
             self.parent[i] = self.parent[self.parent[i] as usize];
             i = self.parent[i] as usize;
@@ -279,7 +279,7 @@ impl Sets {
         i
     }
 
-    fn join(&mut self, a: usize, b: usize) {
+    pub(crate) fn join(&mut self, a: usize, b: usize) {
         let a = self.root(a);
         let b = self.root(b);
         if a != b {

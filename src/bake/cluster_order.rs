@@ -7,6 +7,7 @@
 
 use super::triangles::unit_positions;
 use crate::asset::mesh::Mesh;
+use crate::asset::topology::Sets;
 use crate::layout::{CLUSTER_VERTICES, GROUP_CLUSTERS};
 use glam::Vec3;
 
@@ -24,14 +25,43 @@ const ALONE: usize = 1 << 14;
 type Point = ([f32; 6], u32);
 
 /// The order of the mesh's vertices: which of them stands at each place.
+///
+/// Where vertices of a cluster share place and normal, as on a wall of which a roof divides the lit part from the dark
+/// one, those parts, which hang together by vertices, follow each other: neighbours have the light of one part.
 pub(crate) fn cluster_order(mesh: &Mesh) -> Vec<u32> {
+    let mut parts = Sets::new(mesh.positions.len());
+    for [a, b, c] in &mesh.triangles {
+        parts.join(*a as usize, *b as usize);
+        parts.join(*a as usize, *c as usize);
+    }
+    let parts: Vec<u32> = (0..mesh.positions.len()).map(|v| parts.root(v) as u32).collect();
     let point = |(v, p): (usize, Vec3)| {
         let n = NORMAL_WEIGHT * mesh.normals[v];
         ([p.x, p.y, p.z, n.x, n.y, n.z], v as u32)
     };
     let mut points: Vec<Point> = unit_positions(mesh).into_iter().enumerate().map(point).collect();
     halve(&mut points);
+    for cluster in points.chunks_mut(CLUSTER_VERTICES as usize) {
+        let divided = divided(cluster, &parts);
+        if divided.len() > 1 {
+            let part = |(_, v): &Point| divided.binary_search(&parts[*v as usize]).ok();
+            cluster.sort_by_key(part);
+            cluster.chunk_by_mut(|a, b| part(a) == part(b)).for_each(halve);
+        }
+    }
     points.into_iter().map(|(_, v)| v).collect()
+}
+
+/// The parts of vertices that share place and normal with one of another part, sorted.
+fn divided(points: &[Point], parts: &[u32]) -> Vec<u32> {
+    let mut places: Vec<([u32; 6], u32)> =
+        points.iter().map(|(point, v)| (point.map(f32::to_bits), parts[*v as usize])).collect();
+    places.sort_unstable();
+    let twins = places.windows(2).filter(|pair| pair[0].0 == pair[1].0 && pair[0].1 != pair[1].1);
+    let mut divided: Vec<u32> = twins.flat_map(|pair| [pair[0].1, pair[1].1]).collect();
+    divided.sort_unstable();
+    divided.dedup();
+    divided
 }
 
 fn halve(points: &mut [Point]) {
@@ -54,5 +84,30 @@ fn halve(points: &mut [Point]) {
     } else {
         halve(below);
         halve(above);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::asset::generate;
+
+    /// A plane that is cut in two along a row of vertices, which each part has: no more runs have both parts than the one
+    /// in which a part ends, of every cluster.
+    #[test]
+    fn neighbours_are_of_one_side_of_a_cut() {
+        let part = generate::plane(1.0, 20);
+        let count = part.positions.len() as u32;
+        let positions = [-0.5, 0.5].map(|x| part.positions.iter().map(move |p| *p + x * Vec3::X)).into_iter().flatten();
+        let triangles =
+            [0, count].into_iter().flat_map(|first| part.triangles.iter().map(move |t| t.map(|v| v + first)));
+        let normals = vec![Vec3::Y; 2 * count as usize];
+        let mesh = Mesh::new("cut", positions.collect(), normals, None, triangles.collect()).unwrap();
+        let order = cluster_order(&mesh);
+        let has_both = |run: &&[u32]| run.iter().any(|v| *v < count) && run.iter().any(|v| *v >= count);
+        let on_cut = |run: &[u32]| run.iter().any(|v| mesh.positions[*v as usize].x.abs() < 0.02);
+        for cluster in order.chunks(CLUSTER_VERTICES as usize).filter(|cluster| on_cut(cluster)) {
+            assert!(cluster.chunks(8).filter(has_both).count() <= 1, "{cluster:?}");
+        }
     }
 }

@@ -30,7 +30,7 @@ use std::sync::{Arc, OnceLock};
 use std::time::Instant;
 
 /// Counts in every name of the cache: another number where a bake of surfaces computes something else.
-const VERSION: u32 = 44;
+const VERSION: u32 = 46;
 /// How far towards the middle of its triangles a vertex is seen from, as a share of the way: the light of a crease is
 /// that just inside each face. Where meshes are left as they are, so are the places from which they are seen.
 const NUDGE: f32 = 0.02;
@@ -596,8 +596,8 @@ impl GroupSpace<'_> {
     }
 
     /// From each vertex towards the middle of its triangles, along the surface; and off the surface by
-    /// [`TRANSFER_OFFSET`], as rays of references leave it. A flat mesh does not shade itself, and may be a ground that
-    /// others touch.
+    /// [`TRANSFER_OFFSET`], as rays of references leave it, or half as far as what stands before it there, as a roof that
+    /// ends on a wall, where the vertex is one of several for the sides of what divides its plane. A flat mesh does not shade itself, and may be a ground that others touch.
     pub fn nudges(&self, positions: &[Vec3], normals: &[Vec3], triangles: &[[u32; 3]]) -> Vec<Vec3> {
         let mut sums = vec![(Vec3::ZERO, 0.0_f32); positions.len()];
         for triangle in triangles {
@@ -613,14 +613,22 @@ impl GroupSpace<'_> {
         let least = 1e-5 / self.scale();
         let inward_share = if self.group.plan.refinement.is_some() { NUDGE } else { 0.0 };
         let off = if self.own().mesh.is_flat() { least } else { least.max(TRANSFER_OFFSET * radius_m) };
-        sums.iter()
-            .zip(normals)
-            .map(|((sum, count), normal)| {
-                let inward = *sum / count.max(1.0);
-                let along = inward - inward.dot(*normal) * *normal;
-                inward_share * along + off * *normal
-            })
-            .collect()
+        let mut alike = HashMap::new();
+        let bits = |position: &Vec3, normal: &Vec3| [*position, *normal].map(|of| of.to_array().map(f32::to_bits));
+        for (position, normal) in positions.iter().zip(normals) {
+            *alike.entry(bits(position, normal)).or_insert(0) += 1;
+        }
+        let nudge = |(((sum, count), normal), position): (((Vec3, f32), &Vec3), &Vec3)| {
+            let inward = sum / count.max(1.0);
+            let along = inward_share * (inward - inward.dot(*normal) * *normal);
+            let foot = *position + along + least * *normal;
+            let reach = (off - least) * *normal;
+            let is_parted = off > least && alike[&bits(position, normal)] > 1;
+            let stands = is_parted.then(|| self.first_between(&self.blocks, foot, foot + reach)).flatten();
+            let share = |hit: BlockerHit| 0.5 * hit.distance / self.placed(foot).distance(self.placed(foot + reach));
+            along + least * *normal + stands.map_or(1.0, share) * reach
+        };
+        sums.into_par_iter().zip(normals).zip(positions).map(nudge).collect()
     }
 
     /// A point of the member's frame as seen from where it is nudged to.

@@ -53,12 +53,11 @@ layout(std430, binding = 16) readonly buffer Work {
     PixelStep steps[2];
     uint places[];
 } work;
-layout(std430, binding = 17) writeonly buffer Light { uvec4 light[]; };
+layout(binding = 17, rgba32ui) uniform writeonly uimage2D light;
 
 layout(push_constant) uniform Push {
     uint list;     // which of the steps' lists
     uint texel_px; // width of a place in pixels
-    uint width;    // of the light in places
 } push;
 
 // The light of a surface: of its chain and of the rest, or where there is no chain or no edge as vertices have it.
@@ -110,7 +109,7 @@ uvec4 light_of_surface(SeenSurface seen, float depth) {
 }
 
 void main() {
-    uint i = gl_GlobalInvocationID.x;
+    uint i = 64 * (MOST_GROUPS * gl_WorkGroupID.y + gl_WorkGroupID.x) + gl_LocalInvocationIndex;
     if (i >= work.steps[push.list].count) {
         return;
     }
@@ -118,5 +117,5 @@ void main() {
     uvec2 at = uvec2(packed & 0xffff, packed >> 16);
     ivec2 pixel = ivec2(push.texel_px * at + push.texel_px / 2);
     SeenSurface seen = unpack_surface(texelFetch(seen_triangles, pixel, 0), texelFetch(seen_places, pixel, 0));
-    light[texel_of(at, push.width)] = light_of_surface(seen, texelFetch(depths, pixel, 0).r);
+    imageStore(light, ivec2(at), light_of_surface(seen, texelFetch(depths, pixel, 0).r));
 }

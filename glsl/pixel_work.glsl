@@ -1,11 +1,7 @@
 // Places whose light pass "pixel light" evaluates, of the coarse ones first and of pixels then: PixelWork of
 // src/draw/pixel_light.rs.
 struct PixelStep {
-    uint groups[3]; // of 64 places, in x
+    uint groups[3]; // of 64 places: in rows of MOST_GROUPS
     uint count;
 };
-
-// Texel of a place in a buffer of light, behind its size.
-uint texel_of(uvec2 at, uint width) {
-    return 1 + at.y * width + at.x;
-}
+const uint MOST_GROUPS = 65535; // that every device runs along an axis

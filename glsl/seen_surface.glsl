@@ -21,13 +21,13 @@ uvec4 pack_place(vec3 weights, float step, vec2 slope) {
     return uvec4(whole << 8 | uvec2(bits >> 8, bits & 0xff), floatBitsToUint(slope));
 }
 
-// Of the last number of the first texel.
-bool is_seen(uint receiver) {
-    return receiver != 0;
+// What the last number of the first texel tells.
+bool is_seen(uint packed) {
+    return packed != 0;
 }
 
-bool has_edge(uint receiver) {
-    return (receiver & 2) != 0;
+bool has_edge(uint packed) {
+    return (packed & 2) != 0;
 }
 
 SeenSurface unpack_surface(uvec4 triangle, uvec4 place) {

@@ -15,16 +15,15 @@ layout(std430, binding = 3) buffer Work {
     PixelStep steps[2];
     uint places[];
 } work;
-layout(std430, binding = 4) writeonly buffer Light { uvec4 light[]; };
+layout(binding = 4, rgba32ui) uniform writeonly uimage2D light;
 #if !COARSE
-layout(std430, binding = 5) readonly buffer Coarse { uvec4 coarse[]; };
+layout(binding = 5) uniform utexture2D coarse;
 #endif
 #include "screen_light.glsl"
 #include "seen_surface.glsl"
 
 layout(push_constant) uniform Push {
     uvec4 part; // pixels that are drawn: left, top, width and height
-    uvec2 size; // of the picture
 } push;
 
 const uvec2 BLOCK = uvec2(BLOCK_X, BLOCK_Y); // places that one invocation selects
@@ -54,7 +53,7 @@ ivec2 pixel_of(uvec2 at) {
 #if !COARSE
 // What four coarse places tell of a pixel, or 0.
 uvec4 interpolated(uvec2 pixel, SeenSurface seen, float depth) {
-    uint key = light_key(seen.receiver, seen.front), width = (push.size.x + COARSE_PX - 1) / COARSE_PX;
+    uint key = light_key(seen.receiver, seen.front);
     vec2 place = (vec2(pixel) - float(COARSE_PX / 2)) / float(COARSE_PX);
     ivec2 low = ivec2(floor(place));
     vec2 within = place - vec2(low);
@@ -66,7 +65,7 @@ uvec4 interpolated(uvec2 pixel, SeenSurface seen, float depth) {
     for (uint i = 0; i < 4; i++) {
         ivec2 at = low + ivec2(i & 1, i >> 1);
         bool known = is_in_part(int(COARSE_PX) * at + int(COARSE_PX) / 2);
-        uvec4 texel = known ? coarse[texel_of(uvec2(at), width)] : uvec4(0);
+        uvec4 texel = known ? texelFetch(coarse, at, 0) : uvec4(0);
         float there = depth + float(COARSE_PX) * dot(seen.slope, vec2(at) - place);
         bool fits = known && is_of(texel, key, there, SAME_DEPTH * depth);
         vec3 own = light_of(texel);
@@ -86,10 +85,6 @@ uvec4 interpolated(uvec2 pixel, SeenSurface seen, float depth) {
 }
 #endif
 
-void keep(uvec2 at, uvec4 found) {
-    light[texel_of(at, (push.size.x + TEXEL_PX - 1) / TEXEL_PX)] = found;
-}
-
 void main() {
     // Blocks of four by two places follow each other, whose light is evaluated at the same time. An invocation selects
     // one block, whose places with nothing to tell go first: a software device runs a branch that no lane takes.
@@ -104,7 +99,7 @@ void main() {
             bool lit = COARSE == 1 ? is_seen(seen) : has_edge(seen);
             wanted |= lit ? 1u << i : 0;
             if (!lit) {
-                keep(at, uvec4(0));
+                imageStore(light, ivec2(at), uvec4(0));
             }
         }
     }
@@ -118,12 +113,9 @@ void main() {
         SeenSurface seen = unpack_surface(texelFetch(seen_triangles, pixel, 0), texelFetch(seen_places, pixel, 0));
         uvec4 found = interpolated(at, seen, texelFetch(depths, pixel, 0).r);
         if (found != uvec4(0)) {
-            keep(at, found);
+            imageStore(light, ivec2(at), found);
             wanted &= ~(1u << i);
         }
-    }
-    if (gl_WorkGroupID.xy == uvec2(0) && lane == 0) {
-        light[0] = uvec4(push.size, 0, 0);
     }
 #endif
     if (lane == 0) {
@@ -134,7 +126,9 @@ void main() {
     barrier();
     if (lane == 0 && listed > 0) {
         first = atomicAdd(work.steps[STEP].count, listed);
-        atomicMax(work.steps[STEP].groups[0], (first + listed + 63) / 64);
+        uint groups = (first + listed + 63) / 64;
+        atomicMax(work.steps[STEP].groups[0], min(groups, MOST_GROUPS));
+        atomicMax(work.steps[STEP].groups[1], (groups + MOST_GROUPS - 1) / MOST_GROUPS);
 #if !COARSE
         atomicAdd(work.total, listed);
 #endif

@@ -58,7 +58,7 @@ float lamps = 0.0; // share of the cosine-weighted view that lamps take, which l
 // narrow against the distance to the next. The error grows with the square of that distance over the penumbra's width,
 // and with the light that the shadow takes away. They carry the light around a lamp badly that is as near as the next.
 float finest;       // distance over width, for the narrowest penumbra of the current light that comes as near as the next vertex, or 0
-float missed = 0.0; // most, over all lights, of the square of `finest` times the light
+float missed = 0.0; // most, over all lights, of what vertices miss of one: `add_open`
 float open_light = 0.0; // of all lights: nothing between, or what arrives of those that are blended
 float curved;       // irradiance by the current light, each part's by the square of the step over its distance, of radiance 1
 
@@ -179,9 +179,11 @@ float add_open(float irradiance, float white) {
 }
 #endif
 
-#if KEEPS
+#if KEEPS || BLENDS
 const float LEAST_KEPT = 1e-30; // of what is not dark
+#endif
 
+#if KEEPS
 // What vertices miss of a light, in sixteenths of an octave; 0 for nothing.
 const uint MISS_BITS = 12;
 const uint ALL_MISS = (1u << MISS_BITS) - 1u;
@@ -221,16 +223,21 @@ void settle_kept(float tolerable) {
 
 #if BLENDS
 // Irradiance by a light of radiance 1 between the vertices of a pixel's triangle. Returns whether they carry it well:
-// none of them needs pixels to evaluate it, and it is dark for all of them or for none.
+// it has one colour, none of them needs pixels to evaluate it, and it is dark for all of them or for none.
 bool blended_irradiance(Entity shining, out float irradiance) {
     bool is_kept = shining.irradiance_first != NONE;
-    uvec3 at = lit_vertices + (is_kept ? shining.irradiance_first : 0);
+    uvec3 at = is_kept ? lit_vertices + shining.irradiance_first : uvec3(0);
     uvec2 a = texelFetch(irradiances, int(at.x)).xy, b = texelFetch(irradiances, int(at.y)).xy;
     uvec2 c = texelFetch(irradiances, int(at.z)).xy;
     near_occluders = is_kept ? a.y | b.y | c.y : ~0u;
     vec3 kept = uintBitsToFloat(uvec3(a.x, b.x, c.x));
     irradiance = dot(vertex_weights, kept);
-    return is_kept && (kept == vec3(0.0) || all(greaterThan(kept, vec3(0.0))));
+    float least = min(min(kept.x, kept.y), kept.z), most = max(max(kept.x, kept.y), kept.z);
+    bool blends = is_kept && (least > 0.0 || least == 0.0 && most <= LEAST_KEPT);
+#if COLORS
+    blends = blends && shining.radiance_base == NONE;
+#endif
+    return blends;
 }
 #endif
 
@@ -554,7 +561,7 @@ vec3 chain_sum(Surface surface, uint i, uint end) {
         b++;
     } while (b <= last_block);
     float shines = shining.light_kind == LIGHT_BALL ? shining.light_size : 1.0;
-    // Of a light below the horizon nothing is left to block.
+    // Of a light below the horizon, or that its own mesh hides, nothing is left to block.
     i = unblocked > 0.0 ? next_entry(surface, light, radius, i, end) : end;
     uint packed = entry_at(i);
     b = first_block;

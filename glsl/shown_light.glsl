@@ -1,24 +1,23 @@
 // Light of pixels for the pass that shows it, from what "pixel light" has found.
 #include "screen_light.glsl"
-layout(std430, binding = LIGHT_BINDING) readonly buffer ScreenLight { uvec4 screen_light[]; }; // the first: its size
+layout(binding = LIGHT_BINDING) uniform utexture2D screen_light;
 
 // Replaces light and shares by those of this pixel, or of the first one beside it that shows the same surface; they stay
 // where there is none.
 void find_light(uint entity, bool wanted, inout vec3 light, inout vec4 shares) {
     const ivec2 BESIDE[4] = ivec2[](ivec2(1, 0), ivec2(-1, 0), ivec2(0, 1), ivec2(0, -1));
     float off = SAME_DEPTH * gl_FragCoord.z + 2.0 * fwidth(gl_FragCoord.z);
-    ivec2 size = ivec2(screen_light[0].xy);
-    ivec2 own = clamp(ivec2(gl_FragCoord.xy), ivec2(0), size - 1);
+    ivec2 last = textureSize(screen_light, 0) - 1;
     uint key = light_key(entity, gl_FrontFacing);
-    uvec4 texel = screen_light[1 + own.y * size.x + own.x];
+    uvec4 texel = texelFetch(screen_light, ivec2(gl_FragCoord.xy), 0);
     bool seeks = wanted && !is_of(texel, key, gl_FragCoord.z, off);
     // A loop, because a software device runs a branch that no lane takes. On lavapipe a lane that leaves one before others
     // may lose what it has computed there: those that seek leave it together.
     uvec4 beside = uvec4(0);
     uint i = 0;
     do {
-        ivec2 at = clamp(own + BESIDE[i], ivec2(0), size - 1);
-        uvec4 there = screen_light[1 + at.y * size.x + at.x];
+        ivec2 at = clamp(ivec2(gl_FragCoord.xy) + BESIDE[i], ivec2(0), last);
+        uvec4 there = texelFetch(screen_light, at, 0);
         beside = beside == uvec4(0) && is_of(there, key, gl_FragCoord.z, off) ? there : beside;
         i++;
     } while (seeks && i < 4);

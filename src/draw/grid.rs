@@ -13,7 +13,7 @@ use crate::asset::grid::Grid;
 use crate::draw::pixel_light::{LIGHT_BINDING, shown_light, texels};
 use crate::draw::{DrawnEntity, DrawnViewport, EntityPush, PipelineMaker, made_once};
 use crate::error::Result;
-use crate::gpu::{Bind, Buffer, Device, Drawing, GraphicsPipeline, TexelView};
+use crate::gpu::{Bind, Buffer, Device, Drawing, GraphicsPipeline, Image, TexelView};
 use crate::layout::{QUAD_FORMAT, UPWARDS};
 use crate::shaders::ShaderPermutation;
 use ash::vk;
@@ -170,13 +170,13 @@ impl DrawGrid {
         (grid, indices): (&'r DrawnGrid, Range<u32>),
         entity: &DrawnEntity<'r>,
         viewport: &DrawnViewport<'r>,
-        light: Option<&'r Buffer>,
+        light: Option<&'r Image>,
         white: f32,
     ) -> Result<()> {
         drawing.bind(self.pipeline(light.is_some())?, &[(&grid.positions, 0), (&grid.places, 0)], &grid.indices);
         let mut binds = texels(&[(&grid.corners, QUADS), (viewport.radiosity, QUAD_FORMAT)])?;
         binds.resize(LIGHT_BINDING as usize, Bind::None);
-        binds.extend(light.map(Bind::Buffer));
+        binds.extend(light.map(Bind::Image));
         drawing.resources(&binds)?;
         drawing.push(&Push {
             entity: EntityPush::new(entity, white),

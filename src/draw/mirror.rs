@@ -32,7 +32,7 @@ pub const PROBE_SPREAD: f64 = 3.2;
 /// Texels beside its place that a pixel may read: filters of the coarsest level reach three quarters so far, and faces that
 /// are not quite flat stick out of their rectangles.
 pub const REACH: u32 = 2 * COARSEST;
-/// Pixels of a picture up to which mirrors may have as many: a mirror takes 60 bytes for each.
+/// Pixels of a picture up to which mirrors may have as many: a mirror takes 84 bytes for each.
 const MOST_FINE_PX: u32 = 1920 * 1200;
 /// Least cosine of the angle between a pixel's normal and the plane's. What this leaves of 1 is how far off the plane a
 /// pixel may lie, over its distance from the eye.

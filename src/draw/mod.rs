@@ -257,10 +257,7 @@ impl PipelineMaker {
 
 /// The pipeline that was made before, or is made now: a scene needs few of all that there are, and one may take half a
 /// second to compile.
-fn made_once(
-    made: &OnceLock<GraphicsPipeline>,
-    make: impl FnOnce() -> Result<GraphicsPipeline>,
-) -> Result<&GraphicsPipeline> {
+fn made_once<P>(made: &OnceLock<P>, make: impl FnOnce() -> Result<P>) -> Result<&P> {
     if made.get().is_none() {
         let pipeline = make()?;
         return Ok(made.get_or_init(|| pipeline));
@@ -365,7 +362,7 @@ impl Draw {
     }
 
     /// The light of an entity's pixels in a viewport.
-    fn light_of(&self, viewport: &DrawnViewport<'_>, entity: &DrawnEntity<'_>) -> Option<&Buffer> {
+    fn light_of(&self, viewport: &DrawnViewport<'_>, entity: &DrawnEntity<'_>) -> Option<&Image> {
         let has_pixels = viewport.pixel.is_some() && entity.by_pixel.is_some();
         self.light.as_ref().filter(|_| has_pixels).map(LightImages::light)
     }

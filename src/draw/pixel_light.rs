@@ -19,8 +19,8 @@ use crate::draw::triangles::DrawnTriangles;
 use crate::draw::{DEPTH, DrawnEntity, DrawnMesh, DrawnPaint, DrawnViewport, PipelineMaker, made_once};
 use crate::error::Result;
 use crate::gpu::{
-    Access, Bind, Buffer, BufferKind, Commands, ComputePipeline, Device, Drawing, GraphicsPipeline, GraphicsState, Image,
-    ImageShape, Target, TexelView,
+    Access, Bind, Buffer, BufferKind, Commands, ComputePipeline, Device, Drawing, GraphicsPipeline, GraphicsState,
+    Image, ImageShape, Target, TexelView,
 };
 use crate::layout::QUAD_FORMAT;
 use crate::shaders::{Library, ShaderPermutation};
@@ -32,8 +32,8 @@ use std::sync::{Arc, OnceLock};
 
 /// What is kept of the surface that a pixel shows, twice (`glsl/seen_surface.glsl`).
 const SEEN: vk::Format = vk::Format::R32G32B32A32_UINT;
-/// Bytes of a place's light: light and blue's flag as halves, shares as bytes, depth, entity and its side.
-const LIGHT_BYTES: u64 = 16;
+/// Light of a place: light and blue's flag as halves, shares as bytes, depth, entity and its side.
+const LIGHT: vk::Format = vk::Format::R32G32B32A32_UINT;
 /// Pixels along an edge of a coarse texel.
 const COARSE_PX: u32 = 4;
 /// Places that one invocation selects, across and down.
@@ -149,9 +149,6 @@ struct GridPush {
 struct SelectPush {
     /// Left, top, width and height in pixels.
     part: [u32; 4],
-    /// Of the picture.
-    size: [u32; 2],
-    spare: [u32; 2],
 }
 
 #[repr(C)]
@@ -161,8 +158,6 @@ struct EvaluatePush {
     list: u32,
     /// Width of a place in pixels.
     texel_px: u32,
-    /// Of the light in places.
-    width: u32,
 }
 
 /// The head of the list of places (`glsl/pixel_work.glsl`): how many pixels are evaluated in all, and of each step the
@@ -194,12 +189,14 @@ impl Step {
     }
 }
 
+/// Each is made where it is first needed.
 struct LightPipelines {
     maker: PipelineMaker,
-    /// By receiver; each is made where it is first drawn with.
+    sharp: SharpPermutation,
+    /// By receiver.
     drawn: [OnceLock<GraphicsPipeline>; Receiver::ALL.len()],
-    select: [ComputePipeline; 2],
-    evaluate: ComputePipeline,
+    select: [OnceLock<ComputePipeline>; 2],
+    evaluate: OnceLock<ComputePipeline>,
     /// [`PixelWork::NONE`].
     none: Buffer,
 }
@@ -211,8 +208,8 @@ pub struct LightImages {
     depth: Image,
     /// [`PixelWork`] and the places of one step.
     work: Buffer,
-    /// Light of the places of each step, behind its size.
-    light: [Buffer; 2],
+    /// Light of the places of each step.
+    light: [Image; 2],
 }
 
 impl LightImages {
@@ -220,12 +217,12 @@ impl LightImages {
     pub fn new(device: &Arc<Device>, library: &Library, size: [u32; 2], sharp: SharpPermutation) -> Result<Self> {
         let state = GraphicsState { depth: Some(DEPTH), second: Some(SEEN), ..GraphicsState::plain(SEEN) };
         let maker = PipelineMaker { device: device.clone(), library: library.clone(), state };
-        let compute = |row: &ShaderPermutation| ComputePipeline::new(device, "pixel light", &library.shader(row)?);
         let pipelines = LightPipelines {
             maker,
+            sharp,
             drawn: Default::default(),
-            select: [compute(&Self::select_row(Step::Coarse))?, compute(&Self::select_row(Step::Fine))?],
-            evaluate: compute(&Self::evaluate_row(&sharp))?,
+            select: Default::default(),
+            evaluate: OnceLock::new(),
             none: Buffer::with_data(device, "no pixel work", &[PixelWork::NONE])?,
         };
         Self::of(Arc::new(pipelines), size)
@@ -238,18 +235,17 @@ impl LightImages {
 
     fn of(pipelines: Arc<LightPipelines>, size: [u32; 2]) -> Result<Self> {
         let device = &pipelines.maker.device;
-        let [width, height] = size;
-        let image = |name, format| Image::new(device, name, ImageShape { format, width, height, samples: 1 });
-        let buffer = |name: &str, bytes: u64| Buffer::new(device, name, BufferKind::Device, bytes);
-        let texels = |texel_px: u32| size.map(|px| u64::from(px.div_ceil(texel_px))).iter().product::<u64>();
+        let image = |name, format, texel_px: u32| {
+            let [width, height] = size.map(|px| px.div_ceil(texel_px));
+            Image::new(device, name, ImageShape { format, width, height, samples: 1 })
+        };
+        let pixels: u64 = size.map(u64::from).iter().product();
+        let work_bytes = size_of::<PixelWork>() as u64 + 4 * pixels;
         Ok(LightImages {
-            seen: [image("seen triangles", SEEN)?, image("seen places", SEEN)?],
-            depth: image("seen depth", DEPTH)?,
-            work: buffer("pixel work", size_of::<PixelWork>() as u64 + 4 * texels(1))?,
-            light: [
-                buffer("coarse light", LIGHT_BYTES * (1 + texels(COARSE_PX)))?,
-                buffer("pixel light", LIGHT_BYTES * (1 + texels(1)))?,
-            ],
+            seen: [image("seen triangles", SEEN, 1)?, image("seen places", SEEN, 1)?],
+            depth: image("seen depth", DEPTH, 1)?,
+            work: Buffer::new(device, "pixel work", BufferKind::Device, work_bytes)?,
+            light: [image("coarse light", LIGHT, COARSE_PX)?, image("pixel light", LIGHT, 1)?],
             pipelines,
         })
     }
@@ -258,17 +254,35 @@ impl LightImages {
     pub fn pixel_bytes() -> u64 {
         let seen = 2 * 16 + 4;
         let work = 4;
-        seen + work + LIGHT_BYTES + LIGHT_BYTES / u64::from(COARSE_PX * COARSE_PX)
+        let light = 16;
+        seen + work + light + light / u64::from(COARSE_PX * COARSE_PX)
     }
 
     /// The light of pixels, for pass "draw".
-    pub fn light(&self) -> &Buffer {
+    pub fn light(&self) -> &Image {
         &self.light[Step::Fine as usize]
     }
 
-    /// Makes what is drawn with, on all cores.
+    /// Makes all pipelines for these receivers, on all cores.
     pub fn make(&self, receivers: &[Receiver]) -> Result<()> {
-        receivers.par_iter().try_for_each(|receiver| self.pipeline(*receiver).map(|_| ()))
+        let drawn = || receivers.par_iter().try_for_each(|receiver| self.pipeline(*receiver).map(|_| ()));
+        let select = || [Step::Coarse, Step::Fine].iter().try_for_each(|step| self.select(*step).map(|_| ()));
+        let (evaluate, others) = rayon::join(|| self.evaluate().map(|_| ()), || drawn().and_then(|()| select()));
+        evaluate.and(others)
+    }
+
+    fn compute(&self, row: &ShaderPermutation) -> Result<ComputePipeline> {
+        let PipelineMaker { device, library, .. } = &self.pipelines.maker;
+        ComputePipeline::new(device, "pixel light", &library.shader(row)?)
+    }
+
+    fn select(&self, step: Step) -> Result<&ComputePipeline> {
+        made_once(&self.pipelines.select[step as usize], || self.compute(&Self::select_row(step)))
+    }
+
+    fn evaluate(&self) -> Result<&ComputePipeline> {
+        let LightPipelines { evaluate, sharp, .. } = &*self.pipelines;
+        made_once(evaluate, || self.compute(&Self::evaluate_row(sharp)))
     }
 
     fn pipeline(&self, receiver: Receiver) -> Result<&GraphicsPipeline> {
@@ -281,8 +295,9 @@ impl LightImages {
         let row = |file| ShaderPermutation::new(file, 4);
         match receiver {
             Receiver::Grid => [row("grid.vert").define("BLOCK_CELLS", BLOCK_CELLS), row("grid_seen.frag")],
-            Receiver::Triangles { holes } => ["triangle.vert", "triangle.frag"]
-                .map(|file| row(file).define("HOLES", holes).define("SAMPLES", 1_u32)),
+            Receiver::Triangles { holes } => {
+                ["triangle.vert", "triangle.frag"].map(|file| row(file).define("HOLES", holes).define("SAMPLES", 1_u32))
+            }
         }
     }
 
@@ -307,15 +322,11 @@ impl LightImages {
         let images = images.into_iter().chain([(&self.depth, Access::DepthWrite)]);
         images.clone().for_each(|(image, access)| commands.image_barrier(image, None, access));
         let [color, second] = self.seen.each_ref();
-        let target = Target {
-            color,
-            second: Some(second),
-            clear: Some([0.0; 4]),
-            depth: Some(&self.depth),
-            resolve: None,
-        };
+        let target =
+            Target { color, second: Some(second), clear: Some([0.0; 4]), depth: Some(&self.depth), resolve: None };
         commands.render(&target, |drawing| self.draw(drawing, viewports))?;
         images.for_each(|(image, access)| commands.image_barrier(image, Some(access), Access::ComputeSampled));
+        self.light.iter().for_each(|light| commands.image_barrier(light, None, Access::ComputeWrite));
         let none = &self.pipelines.none;
         commands.copy_range(none, 0..none.size_bytes, &self.work, 0);
         commands.barrier(Access::TransferWrite, Access::ComputeWrite);
@@ -332,11 +343,11 @@ impl LightImages {
                 commands.barrier(Access::TransferWrite, Access::ComputeWrite);
             }
             is_first = false;
-            self.evaluate(commands, viewport, light, Step::Coarse)?;
-            commands.barrier(Access::ComputeWrite, Access::ComputeRead);
+            self.light_places(commands, viewport, light, Step::Coarse)?;
+            commands.barrier(Access::ComputeWrite, Access::ComputeSampled);
             commands.barrier(Access::ComputeWrite, Access::ComputeWrite);
             commands.barrier(Access::Indirect, Access::ComputeWrite);
-            self.evaluate(commands, viewport, light, Step::Fine)?;
+            self.light_places(commands, viewport, light, Step::Fine)?;
         }
         commands.barrier(Access::ComputeWrite, Access::GraphicsSampled);
         Ok(())
@@ -349,7 +360,7 @@ impl LightImages {
     }
 
     /// Lists the places of a step in a viewport, and evaluates them.
-    fn evaluate<'r>(
+    fn light_places<'r>(
         &'r self,
         commands: &mut Commands<'r>,
         viewport: &DrawnViewport<'r>,
@@ -361,26 +372,24 @@ impl LightImages {
         let [coarse, _] = &self.light;
         let found = &self.light[step as usize];
         let work = Bind::Buffer(&self.work);
-        let ImageShape { width: picture_width, height: picture_height, .. } = self.depth.shape;
-        let push = SelectPush { part: viewport.drawn, size: [picture_width, picture_height], spare: [0; 2] };
         let resources =
-            [seen.clone(), places.clone(), depth.clone(), work.clone(), Bind::Buffer(found), Bind::Buffer(coarse)];
+            [seen.clone(), places.clone(), depth.clone(), work.clone(), Bind::Image(found), Bind::Image(coarse)];
         // Eight by eight blocks of places make a workgroup of 64, from the place that holds the first pixel.
         let [left, top, width, height] = viewport.drawn;
         let texel_px = step.texel_px();
         let count = |first: u32, size: u32| (first + size).div_ceil(texel_px) - first / texel_px;
         let [across, down] = SELECTED_BLOCK;
         let elements = [64 * count(left, width).div_ceil(8 * across), count(top, height).div_ceil(8 * down), 1];
-        commands.dispatch(&self.pipelines.select[step as usize], &resources, &push, elements)?;
+        commands.dispatch(self.select(step)?, &resources, &SelectPush { part: viewport.drawn }, elements)?;
         commands.barrier(Access::ComputeWrite, Access::ComputeRead);
         commands.barrier(Access::ComputeWrite, Access::ComputeWrite);
         commands.barrier(Access::ComputeWrite, Access::Indirect);
         let mut binds = light.binds(viewport.radiosity)?;
         binds.splice(11..14, [seen, places, depth]);
-        binds.extend([work, Bind::Buffer(found)]);
-        let push = EvaluatePush { list: step as u32, texel_px, width: picture_width.div_ceil(texel_px) };
+        binds.extend([work, Bind::Image(found)]);
+        let push = EvaluatePush { list: step as u32, texel_px };
         let groups = (&self.work, PixelWork::STEPS_AT + PixelWork::STEP_BYTES * step as u64);
-        commands.dispatch_indirect(&self.pipelines.evaluate, &binds, &push, groups)
+        commands.dispatch_indirect(self.evaluate()?, &binds, &push, groups)
     }
 
     /// Draws marked triangles of all receivers.

@@ -7,7 +7,7 @@ use crate::draw::pixel_light::{LIGHT_BINDING, shown_light, texels};
 use crate::draw::{DrawnEntity, DrawnPaint, DrawnViewport, EntityPush, PipelineMaker, made_once};
 use crate::error::Result;
 use crate::gloss::{self, DrawnReflections};
-use crate::gpu::{Bind, Buffer, Device, Drawing, GraphicsPipeline, GraphicsState, Keeps, TexelView};
+use crate::gpu::{Bind, Buffer, Device, Drawing, GraphicsPipeline, GraphicsState, Image, Keeps, TexelView};
 use crate::layout::QUAD_FORMAT;
 use crate::lists::sight::TriangleRun;
 use crate::shaders::ShaderPermutation;
@@ -177,7 +177,7 @@ const MIRROR_BINDING: u32 = LIGHT_BINDING + 1;
 #[derive(Clone, Copy)]
 pub enum DrawnLayer<'d> {
     /// An opaque one, by the light of its pixels where they have any of their own.
-    Opaque { light: Option<&'d Buffer> },
+    Opaque { light: Option<&'d Image> },
     /// Of a transparent one the depth of what is nearest.
     Depth,
     /// Its colour over what lies behind.
@@ -318,7 +318,7 @@ impl DrawTriangles {
         }
         if let DrawnLayer::Opaque { light: Some(light) } = layer {
             binds.resize(LIGHT_BINDING as usize, Bind::None);
-            binds.push(Bind::Buffer(light));
+            binds.push(Bind::Image(light));
         }
         if let (Look::Glossy { .. }, Some(mirrors)) = (look, mirrors) {
             binds.resize(MIRROR_BINDING as usize, Bind::None);

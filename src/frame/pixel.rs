@@ -25,15 +25,22 @@ pub(super) struct PixelChains {
     lit: Vec<Option<(ByPixel, f32)>>,
     /// The first of these of every entity.
     pub receivers: Buffer,
+    /// Whether texel views hold what all pixels bind.
+    views_fit: bool,
     /// Entities as they were when the chains were made, and their bounds with what each of them takes part in.
     known: Option<(Vec<layout::DeviceEntity>, Vec<EntityBounds>)>,
 }
 
 impl PixelChains {
     /// Empty chains for the lit entities of a scene.
-    pub fn new(device: &Arc<Device>, scene: &Scene, buffers: &SceneBuffers, radiosity: &RadiosityBuffers) -> Result<Self> {
-        // All pixels bind them, also those that read none.
-        let maps_fit = TexelView::fits(device, vk::Format::R32G32_UINT, buffers.self_cells.size_bytes);
+    pub fn new(
+        device: &Arc<Device>,
+        scene: &Scene,
+        buffers: &SceneBuffers,
+        radiosity: &RadiosityBuffers,
+    ) -> Result<Self> {
+        let views_fit = TexelView::fits(device, vk::Format::R32G32_UINT, buffers.self_cells.size_bytes)
+            && TexelView::fits(device, QUAD_FORMAT, buffers.vertices.size_bytes);
         let mut clusters = 0;
         let mut receivers = Vec::with_capacity(scene.entities.len());
         let mut lit = Vec::with_capacity(scene.entities.len());
@@ -49,7 +56,7 @@ impl PixelChains {
                 vertex_first: surface.vertices.start,
                 self_first: surface.self_first,
             };
-            let is_lit = entity.receives && maps_fit && fits && !entity.transparent;
+            let is_lit = entity.receives && views_fit && fits && !entity.transparent;
             receivers.push(by_pixel);
             lit.push(is_lit.then_some((by_pixel, surface.reach_m)));
             clusters += if is_lit { (surface.vertices.len() as u32).div_ceil(CLUSTER_VERTICES) } else { 0 };
@@ -62,6 +69,7 @@ impl PixelChains {
             chains: upload("pixel chains", 8 * clusters.max(1) as usize)?,
             lit,
             receivers: Buffer::with_data(device, "pixel receivers", &receivers)?,
+            views_fit,
             known: None,
         })
     }
@@ -75,7 +83,8 @@ impl PixelChains {
     /// vertices evaluate.
     pub fn is_ready(&self) -> bool {
         let device = self.entries.device();
-        self.known.is_some()
+        self.views_fit
+            && self.known.is_some()
             && TexelView::fits(device, QUAD_FORMAT, self.entities.size_bytes)
             && TexelView::fits(device, ENTRY_FORMAT, self.entries.size_bytes)
             && TexelView::fits(device, vk::Format::R32G32_UINT, self.chains.size_bytes)

@@ -77,12 +77,11 @@ impl RadiosityBuffers {
         if self.irradiances.is_some() {
             return Ok(());
         }
-        // Pixels evaluate lights of several colours wherever they evaluate any.
-        let has_colors = |light: usize| scene.meshes[scene.entities[light].mesh].colors.is_some();
-        let is_kept = |&light: &usize| scene.entities[light].emits && methods[light].is_sharp() && !has_colors(light);
+        let is_kept = |&light: &usize| scene.entities[light].emits && methods[light].is_sharp();
         let device = self.merged.device();
         let limits = &device.limits;
-        let bound = limits.max_texel_buffer_elements.min(limits.max_storage_buffer_range / size_of::<KeptIrradiance>() as u32);
+        let bound =
+            limits.max_texel_buffer_elements.min(limits.max_storage_buffer_range / size_of::<KeptIrradiance>() as u32);
         let vertices = self.merged.size_bytes / 16;
         let most = (u64::from(bound) / vertices) as usize;
         let lights = (0..scene.entities.len()).filter(is_kept);

@@ -20,13 +20,13 @@ pub enum Access {
     TransferWrite,
     /// A compute shader reads a storage or uniform block.
     ComputeRead,
-    /// A compute shader writes (and may read) a storage block.
+    /// A compute shader writes (and may read) a storage block, or stores to an image.
     ComputeWrite,
     /// A compute shader reads a texel buffer or a sampled image.
     ComputeSampled,
     /// The device reads how many workgroups to run.
     Indirect,
-    /// A vertex or fragment shader reads an image or a texel buffer with `texelFetch`, or a storage block.
+    /// A vertex or fragment shader reads an image or a texel buffer with `texelFetch`.
     GraphicsSampled,
     /// Vertex attributes and indices.
     VertexRead,
@@ -67,8 +67,7 @@ impl Access {
             Access::ComputeRead => Mask::SHADER_STORAGE_READ | Mask::UNIFORM_READ,
             Access::ComputeWrite => Mask::SHADER_STORAGE_READ | Mask::SHADER_STORAGE_WRITE,
             Access::Indirect => Mask::INDIRECT_COMMAND_READ,
-            Access::ComputeSampled => Mask::SHADER_SAMPLED_READ,
-            Access::GraphicsSampled => Mask::SHADER_SAMPLED_READ | Mask::SHADER_STORAGE_READ,
+            Access::ComputeSampled | Access::GraphicsSampled => Mask::SHADER_SAMPLED_READ,
             Access::VertexRead => Mask::VERTEX_ATTRIBUTE_READ | Mask::INDEX_READ,
             Access::ColorWrite => Mask::COLOR_ATTACHMENT_READ | Mask::COLOR_ATTACHMENT_WRITE,
             Access::DepthWrite => Mask::DEPTH_STENCIL_ATTACHMENT_READ | Mask::DEPTH_STENCIL_ATTACHMENT_WRITE,

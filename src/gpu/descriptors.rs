@@ -22,7 +22,7 @@ pub enum Bind<'r> {
     /// A byte range of a buffer. Its start keeps the device's offset alignment (at most 256 bytes).
     Range(&'r Buffer, Range<u64>),
     Texel(TexelView<'r>),
-    /// An image that is read with `texelFetch`.
+    /// An image that is read with `texelFetch`, or that a compute shader stores to.
     Image(&'r Image),
     /// A texture that a fragment shader samples.
     Texture(&'r Texture),
@@ -93,7 +93,6 @@ impl<'r> Commands<'r> {
                     let size = range.end - range.start;
                     let access = match (binding.kind, binding.writes) {
                         (Kind::STORAGE_BUFFER, true) => Access::ComputeWrite,
-                        (Kind::STORAGE_BUFFER, false) if graphics => Access::GraphicsSampled,
                         _ => Access::ComputeRead,
                     };
                     self.tracker.use_range(buffer.id, &buffer.name, range.clone(), access, &pass);
@@ -112,6 +111,15 @@ impl<'r> Commands<'r> {
                         sampler: vk::Sampler::null(),
                         image_view: image.view(),
                         image_layout: sampled.layout(),
+                    }];
+                    write = write.image_info(&images);
+                }
+                (Kind::STORAGE_IMAGE, Bind::Image(image)) => {
+                    self.tracker.use_image(image.id, &image.name, Access::ComputeWrite, &pass);
+                    images = [vk::DescriptorImageInfo {
+                        sampler: vk::Sampler::null(),
+                        image_view: image.view(),
+                        image_layout: Access::ComputeWrite.layout(),
                     }];
                     write = write.image_info(&images);
                 }
@@ -169,6 +177,7 @@ impl<'r> Commands<'r> {
                 vk::DescriptorType::UNIFORM_BUFFER,
                 vk::DescriptorType::UNIFORM_TEXEL_BUFFER,
                 vk::DescriptorType::SAMPLED_IMAGE,
+                vk::DescriptorType::STORAGE_IMAGE,
                 vk::DescriptorType::COMBINED_IMAGE_SAMPLER,
             ]
             .map(|ty| vk::DescriptorPoolSize { ty, descriptor_count: 16 * SETS_PER_POOL });

@@ -76,6 +76,7 @@ impl<'r> Commands<'r> {
         });
         let mut colors = vec![color];
         if let Some(second) = target.second {
+            assert!(target.resolve.is_none() && first && last, "{}: a second image is drawn at once", second.name);
             self.tracker.use_image(second.id, &second.name, Access::ColorWrite, &pass);
             colors.push(color.image_view(second.view()).load_op(vk::AttachmentLoadOp::DONT_CARE));
         }

@@ -99,8 +99,7 @@ impl Recording {
         let pass = self.passes.len() - 1;
         self.counted.push(pass);
         if self.counts.is_none() {
-            self.counts =
-                Some(Buffer::new(&self.device, "counts", BufferKind::Readback, 4 * u64::from(MAX_PASSES))?);
+            self.counts = Some(Buffer::new(&self.device, "counts", BufferKind::Readback, 4 * u64::from(MAX_PASSES))?);
         }
         let counts = self.counts.as_ref().expect("it was made");
         Ok((counts.raw(), 4 * pass as u64))

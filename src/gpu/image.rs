@@ -49,6 +49,9 @@ impl Image {
             (false, true) => Use::COLOR_ATTACHMENT,
             (false, false) => Use::COLOR_ATTACHMENT | Use::SAMPLED | Use::TRANSFER_SRC | Use::TRANSFER_DST,
         };
+        // Every device stores to images of this format.
+        let stored = shape.format == vk::Format::R32G32B32A32_UINT;
+        let usage = if stored { usage | Use::STORAGE } else { usage };
         Self::with_levels(device, name, shape, 1, usage)
     }
 

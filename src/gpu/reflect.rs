@@ -13,7 +13,8 @@ pub struct Binding {
     pub index: u32,
     /// Name of the variable, or of its block where the variable has none.
     pub name: String,
-    /// Storage or uniform block, texel buffer, image (`texture2D`), or image with a sampler (`sampler2D`).
+    /// Storage or uniform block, texel buffer, image (`texture2D`, or `image2D` of compute shaders), or image with a sampler
+    /// (`sampler2D`).
     pub kind: vk::DescriptorType,
     pub writes: bool,
     /// Bytes of the fixed part of the block; 0 for texels and images.
@@ -189,6 +190,10 @@ impl<'m> Reader<'m> {
             (StorageClass::Uniform, Op::TypeStruct) => (vk::DescriptorType::UNIFORM_BUFFER, false),
             (StorageClass::UniformConstant, Op::TypeImage) => match definition.operands[1] {
                 Operand::Dim(Dim::DimBuffer) => (vk::DescriptorType::UNIFORM_TEXEL_BUFFER, false),
+                // Its sixth operand tells whether it is sampled, 1, or stored to, 2.
+                Operand::Dim(Dim::Dim2D) if literal(definition.operands.get(5)) == 2 => {
+                    (vk::DescriptorType::STORAGE_IMAGE, true)
+                }
                 Operand::Dim(Dim::Dim2D) => (vk::DescriptorType::SAMPLED_IMAGE, false),
                 ref other => return Err(Error::Failed(format!("{name}: images of {other:?} are not in use"))),
             },

@@ -41,7 +41,7 @@ const EDGE_STEPS: f64 = 1.1;
 /// take a tenth longer.
 const BLENDED_MISS: f64 = 0.25;
 
-/// The most that vertices miss of a light, in the same measure: eight steps in the width of a penumbra, past which no more
+/// The most that vertices miss of a light, in the same measure: eight widths of a penumbra in a step, past which no more
 /// than the light itself is missed. Of lights with less than 0.3 % of all light there pixels blend all shadows.
 const MOST_MISS: f64 = 64.0;
 

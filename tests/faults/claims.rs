@@ -64,6 +64,7 @@ const LIMITS: &[Row<fn(&mut ash::vk::PhysicalDeviceLimits)>] = &[
         Refused(4, "bytes, the device takes 512")),
     ("uniform buffers of 16 KiB", "--variant storage-uniform", |l| l.max_uniform_buffer_range = 1 << 14, Same),
     ("texel buffers of 65536 texels", "--variant texel-packed", |l| l.max_texel_buffer_elements = 1 << 16, Same),
+    ("texel buffers of 256 texels, with pixels", "--shading pixel", |l| l.max_texel_buffer_elements = 1 << 8, Other),
     ("texel buffers of 4 texels", "--variant texel-packed", |l| l.max_texel_buffer_elements = 4, Refused(4, "(4)")),
     ("images of 4096 pixels", "", |l| l.max_image_dimension2_d = 4096, Same),
     ("images of 8 pixels", "", |l| l.max_image_dimension2_d = 8, Refused(4, "at most 8 px")),

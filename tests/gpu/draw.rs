@@ -268,8 +268,8 @@ fn textures_multiply_the_light_of_a_grey_surface() {
         let scene = scene.build().unwrap();
         let mut frame = gpu.frame(&scene, options(Antialias::Samples));
         let timings = frame.render(&scene.at(0.0), Some(f32::INFINITY)).unwrap();
-        let evaluated = timings.iter().find_map(|timing| timing.counted);
-        assert!(evaluated.is_none_or(|count| count > 100), "no pixel evaluates a light");
+        let evaluated = timings.iter().find_map(|timing| timing.counted).unwrap();
+        assert!(evaluated > 100, "no pixel evaluates a light");
         frame.picture()
     };
     let grey = wall(Albedo::Color(Vec3::splat(0.5)));

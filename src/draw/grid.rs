@@ -5,9 +5,8 @@
 //! longer for many small triangles than for a large one of the same area. The picture is that of the triangles, except
 //! for rounding.
 //!
-//! Blocks of cells, the patches, are drawn by pass "pixel light" where a shadow's edge comes near. A software rasteriser
-//! runs a fragment shader's branches for all pixels of a block of its own, taken or not, so a vertex shader throws the
-//! other patches away.
+//! Blocks of cells, the patches, are drawn by pass "pixel light" where a shadow's edge comes near; a vertex shader throws
+//! the others away, whose pixels are those of vertices.
 
 use crate::asset::grid::Grid;
 use crate::draw::pixel_light::{LIGHT_BINDING, shown_light, texels};

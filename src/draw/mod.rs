@@ -83,8 +83,7 @@ pub enum Shading {
 
 impl Shading {
     /// Default of the shading: pixels where they have several samples, as on a GPU and in files, else vertices. A
-    /// pixel that evaluates lights takes about 2 us of a core on llvmpipe, so frames full of shadow edges take up to 4
-    /// times as long as with vertices.
+    /// pixel that evaluates a few lights takes about 2 us of a core on llvmpipe, one among 45 lamps 100 us.
     pub fn usual(antialias: Antialias) -> Self {
         if antialias == Antialias::Samples { Shading::Pixel } else { Shading::Vertex }
     }

@@ -8,6 +8,7 @@ use shadow_fields::asset::mesh::Attributes;
 use shadow_fields::asset::texture::Texture;
 use shadow_fields::asset::{Generator, Mesh};
 use shadow_fields::bake::Baker;
+use shadow_fields::check::sharp::sharp_options;
 use shadow_fields::draw::Antialias;
 use shadow_fields::draw::camera::through_pixels;
 use shadow_fields::frame;
@@ -266,7 +267,9 @@ fn textures_multiply_the_light_of_a_grey_surface() {
             .entity(EntityData { scale: 2.0, ..stands("ball", [0.5, 0.2, 0.6]) })
             .entity(shines("ball", [1.0, 1.0, 2.0], 40.0));
         let scene = scene.build().unwrap();
-        let mut frame = gpu.frame(&scene, options(Antialias::Samples));
+        let size = [WIDTH as u32, HEIGHT as u32];
+        let mut frame =
+            gpu.frame(&scene, frame::Options { size, antialias: Antialias::Samples, shading: None, ..sharp_options() });
         let timings = frame.render(&scene.at(0.0), Some(f32::INFINITY)).unwrap();
         let evaluated = timings.iter().find_map(|timing| timing.counted).unwrap();
         assert!(evaluated > 100, "no pixel evaluates a light");

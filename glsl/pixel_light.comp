@@ -46,13 +46,8 @@ vec4 shares_at(uint vertex) {
 layout(binding = 11) uniform utexture2D seen_triangles;
 layout(binding = 12) uniform utexture2D seen_places;
 layout(binding = 13) uniform texture2D depths;
+#define WORK_BLOCK layout(std430, binding = 16) readonly buffer
 #include "pixel_work.glsl"
-layout(std430, binding = 16) readonly buffer Work {
-    uint total;
-    uint spare[3];
-    PixelStep steps[2];
-    uint places[];
-} work;
 layout(binding = 17, rgba32ui) uniform writeonly uimage2D light;
 
 layout(push_constant) uniform Push {

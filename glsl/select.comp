@@ -8,13 +8,8 @@ layout(local_size_x = 64) in;
 layout(binding = 0) uniform utexture2D seen_triangles;
 layout(binding = 1) uniform utexture2D seen_places;
 layout(binding = 2) uniform texture2D depths;
+#define WORK_BLOCK layout(std430, binding = 3) buffer
 #include "pixel_work.glsl"
-layout(std430, binding = 3) buffer Work {
-    uint total;
-    uint spare[3];
-    PixelStep steps[2];
-    uint places[];
-} work;
 layout(binding = 4, rgba32ui) uniform writeonly uimage2D light;
 #if !COARSE
 layout(binding = 5) uniform utexture2D coarse;

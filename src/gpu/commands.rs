@@ -31,6 +31,15 @@ pub(super) fn packed(image: &Image) -> vk::BufferImageCopy {
     vk::BufferImageCopy::default().image_subresource(layers).image_extent(extent)
 }
 
+/// After accesses of one kind and before those of another, for all memory.
+fn between(from: Access, to: Access) -> vk::MemoryBarrier2<'static> {
+    vk::MemoryBarrier2::default()
+        .src_stage_mask(from.stage())
+        .src_access_mask(from.mask())
+        .dst_stage_mask(to.stage())
+        .dst_access_mask(to.mask())
+}
+
 /// A recording in progress. It borrows every resource that it uses until it is submitted.
 pub struct Commands<'r> {
     pub(super) recording: Recording,
@@ -96,14 +105,7 @@ impl<'r> Commands<'r> {
         let (handle, commands) = self.raw();
         // SAFETY: the buffer is borrowed until the commands have run, and the recording keeps the other.
         unsafe { handle.cmd_copy_buffer(commands, buffer.raw(), counts, &regions) };
-        let [from, to] = [Access::TransferWrite, Access::HostRead];
-        self.memory_barrier(
-            vk::MemoryBarrier2::default()
-                .src_stage_mask(from.stage())
-                .src_access_mask(from.mask())
-                .dst_stage_mask(to.stage())
-                .dst_access_mask(to.mask()),
-        );
+        self.memory_barrier(between(Access::TransferWrite, Access::HostRead));
         Ok(())
     }
 
@@ -146,13 +148,7 @@ impl<'r> Commands<'r> {
             return;
         }
         self.tracker.barrier(from, to, None);
-        self.memory_barrier(
-            vk::MemoryBarrier2::default()
-                .src_stage_mask(from.stage())
-                .src_access_mask(from.mask())
-                .dst_stage_mask(to.stage())
-                .dst_access_mask(to.mask()),
-        );
+        self.memory_barrier(between(from, to));
     }
 
     /// Barriers between all that compute shaders wrote and what they read next.

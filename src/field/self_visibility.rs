@@ -118,13 +118,18 @@ pub fn visible(map: &[u8], normal: DVec3, direction: DVec3, radius_rad: f64, dis
     1.0 - (1.0 - blocked_share(angle / radius_rad.max(RADIUS_MINIMUM_RAD))) * blocks
 }
 
-/// A map as `glsl/self_visibility.glsl` reads it: two words for each cell, row by row, with the angles and the
-/// distances of its corners (0, 0), (1, 0), (0, 1) and (1, 1), the first in the lowest bits. There is no padding.
-pub fn cells(map: &[u8]) -> [[u32; 2]; CELLS] {
-    std::array::from_fn(|cell| {
-        let first = cell / (SIDE - 1) * SIDE + cell % (SIDE - 1);
-        [0, NODES].map(|bytes| u32::from_le_bytes([0, 1, SIDE, SIDE + 1].map(|corner| map[bytes + first + corner])))
-    })
+/// Writes a map of [`BYTES`] as `glsl/self_visibility.glsl` reads it: two words for each of [`CELLS`], row by row, with
+/// the angles and the distances of its corners (0, 0), (1, 0), (0, 1) and (1, 1), the first in the lowest bits.
+pub fn write_cells(map: &[u8], cells: &mut [[u32; 2]]) {
+    let word = |above: &[u8], below: &[u8]| u32::from_le_bytes([above[0], above[1], below[0], below[1]]);
+    for (word_of_cell, nodes) in map.chunks_exact(NODES).enumerate() {
+        for (y, row) in cells.chunks_exact_mut(SIDE - 1).enumerate() {
+            let nodes = nodes[y * SIDE..][..2 * SIDE].split_at(SIDE);
+            for (cell, (above, below)) in row.iter_mut().zip(nodes.0.windows(2).zip(nodes.1.windows(2))) {
+                cell[word_of_cell] = word(above, below);
+            }
+        }
+    }
 }
 
 #[cfg(test)]
@@ -167,7 +172,8 @@ mod tests {
     fn cells_hold_the_corners_that_a_lookup_blends() {
         let mut rng = fastrand::Rng::with_seed(6);
         let map: Vec<u8> = (0..BYTES).map(|_| rng.u8(..)).collect();
-        let cells = cells(&map);
+        let mut cells = [[0; 2]; CELLS];
+        write_cells(&map, &mut cells);
         for _ in 0..1000 {
             let local = random_direction(&mut rng);
             let place = place(local);

@@ -14,7 +14,7 @@ use crate::draw::DrawnMesh;
 use crate::error::Result;
 use crate::field::ShadowField;
 use crate::field::quantity::channel_stride;
-use crate::field::self_visibility::{self, BYTES};
+use crate::field::self_visibility::{self, BYTES, CELLS};
 use crate::field::sheet::Rectangle;
 use crate::field::visibility_volume::SceneVolume;
 use crate::gpu::{Buffer, Device, Texture};
@@ -27,6 +27,7 @@ use crate::scene::{Lights, MapIndices, Scene};
 use field_atlas::FieldAtlas;
 pub use field_atlas::FieldSlot;
 use glam::DVec3;
+use rayon::prelude::*;
 pub use silhouettes::{MeshSlots, Silhouettes, Slot};
 use std::ops::Range;
 use std::sync::Arc;
@@ -134,8 +135,11 @@ impl Packing {
         });
         let self_first = baked.self_visibility.as_ref().map_or(NONE, |maps| {
             let first = self_cells.len() as u32;
-            let map = |&v: &u32| self_visibility::cells(&maps[v as usize * BYTES..][..BYTES]);
-            self_cells.extend(order.iter().flat_map(map));
+            self_cells.resize(self_cells.len() + CELLS * order.len(), [0; 2]);
+            let cells = self_cells[first as usize..].par_chunks_exact_mut(CELLS);
+            cells.zip(&order).for_each(|(cells, &v)| {
+                self_visibility::write_cells(&maps[v as usize * BYTES..][..BYTES], cells);
+            });
             first
         });
         Ok(DeviceSurface {

@@ -8,9 +8,9 @@ use crate::bounce::Bounces;
 use crate::scene::Scene;
 
 /// Pixels along the longer side of the picture that is metered.
-const SIZE_PX: f64 = 48.0;
+const SIZE_PX: f64 = 32.0;
 /// Rays a pixel and light; each is followed as it bounces, as most of the light in a room does.
-const RAYS: u32 = 16;
+const RAYS: u32 = 8;
 /// Share of the pixels that are darker than the one that is shown nearly white.
 const BRIGHT: f64 = 0.92;
 /// Value that it gets, linear.

@@ -7,7 +7,7 @@ use shadow_fields::bake::surfaces::{BakedSurface, GroupPlan};
 use shadow_fields::bake::{self, TRANSFER_OFFSET, Wanted};
 use shadow_fields::field::quantity::channel_stride;
 use shadow_fields::field::self_visibility::{
-    BYTES, CELLS, LIMIT_RAD, NODES, cells, decode_angle, encode_angle, frame, node_direction, visible,
+    BYTES, CELLS, LIMIT_RAD, NODES, decode_angle, encode_angle, frame, node_direction, visible, write_cells,
 };
 use shadow_fields::field::sub_light::{LightPart, SeenLight};
 use shadow_fields::gpu::{Bind, Buffer, Commands, ComputePipeline};
@@ -119,7 +119,8 @@ fn a_shader_finds_what_rust_finds() {
     let distance = |i: usize| [0.5_f32, 1.0, 1e9][i / 3 % 3];
     let quads = |(i, [normal, light]): (usize, &[Vec3; 2])| [normal.extend(distance(i)), light.extend(radius(i))];
     let quads: Vec<Vec4> = rays.iter().enumerate().flat_map(quads).collect();
-    let words: Vec<[u32; 2]> = maps.iter().flat_map(|map| cells(map)).collect();
+    let mut words = vec![[0; 2]; CELLS * maps.len()];
+    words.chunks_exact_mut(CELLS).zip(&maps).for_each(|(cells, map)| write_cells(map, cells));
     let device = &gpu.device;
     let [words, quads] =
         [Buffer::with_data(device, "cells", &words).unwrap(), Buffer::with_data(device, "rays", &quads).unwrap()];

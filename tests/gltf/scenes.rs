@@ -285,6 +285,14 @@ fn lights_are_balls_of_their_intensity() {
     assert!(said.contains("the directional light is a distant disc"), "{said}");
     assert_eq!(import.notes.left_out(), ["left out (1): further directional lights"]);
     assert!(import.data.environment.sky.is_none());
+    // Blender writes lamps as 683 lumens a watt, and emission in watts.
+    model.json["asset"]["generator"] = json!("Khronos glTF Blender I/O v4.5.47");
+    let of_blender = load(&model);
+    assert!(of_blender.notes.said().join("\n").contains("683 lumens a watt"), "{:?}", of_blender.notes.said());
+    let radiance = of_blender.data.environment.sun.as_ref().unwrap().radiance;
+    assert!((683.0 * radiance / sun.radiance - 1.0).truncate().length() < 1e-5, "{radiance}");
+    let emission = of_blender.data.entities.iter().find(|e| e.mesh == "lamp").unwrap().emission;
+    assert!((683.0 * emission / lamp.emission - 1.0).truncate().length() < 1e-5, "{emission}");
 }
 
 /// A spot 2 m above a floor, by ray casting: what the floor gets is the intensity over the square of the distance,

@@ -1,8 +1,8 @@
 //! Punctual lights as glowing balls, of which spots shine within a cone, and a directional light as a distant disc.
 //!
-//! A point has no size, so a lamp gets one, which is said: a hundredth of the scene's radius, at most a bulb's. Candela are taken as W
-//! sr^-1, and the ball's radiance is the intensity over its mean outline, so that what is lit from afar does not depend
-//! on the radius.
+//! A point has no size, so a lamp gets one, which is said: a hundredth of the scene's radius, at most a bulb's. Candela
+//! are taken as W sr^-1 but for those of Blender ([`lumens_a_watt`]), and the ball's radiance is the intensity over its
+//! mean outline, so that what is lit from afar does not depend on the radius.
 
 use ::gltf::json::extensions::scene::khr_lights_punctual::{Light, Type};
 use ::gltf::json::validation::Checked;
@@ -25,6 +25,8 @@ const RADIUS_SHARE: f64 = 0.01;
 const RADIUS_M: f64 = 0.03;
 /// Cuts of the icosahedron that stands for a ball: 320 triangles.
 const SUBDIVISIONS: u32 = 2;
+/// What Blender takes a watt of its lamps for.
+const BLENDER_LUMENS_A_WATT: f32 = 683.0;
 pub const BALL: &str = "lamp";
 
 /// What stands for the lights of a file that shine.
@@ -47,6 +49,8 @@ impl Lamps {
     ) -> Result<Self> {
         let all = document.root.extensions.as_ref().and_then(|e| e.khr_lights_punctual.as_ref());
         let all = all.map_or(&[][..], |e| &e.lights);
+        let lumens_a_watt = lumens_a_watt(document);
+        let intensity = |light: &Light| Vec3::from(light.color) * light.intensity / lumens_a_watt;
         let mut lights = Vec::new();
         let mut sun = None;
         for stand in stands {
@@ -64,7 +68,7 @@ impl Lamps {
             match light.type_ {
                 _ if intensity(light) == Vec3::ZERO => {}
                 Checked::Valid(Type::Directional) if sun.is_none() => {
-                    sun = Some(distant(document, light, stand, notes)?)
+                    sun = Some(distant(document, intensity(light), stand, notes)?)
                 }
                 Checked::Valid(Type::Directional) => notes.leave_out("further directional lights"),
                 Checked::Invalid => notes.leave_out("lights of unknown types"),
@@ -77,6 +81,11 @@ impl Lamps {
         };
         let of_sun = |sun: &Sun| f64::from(sun.radiance.max_element()) * disc_sr(sun.angle_deg);
         let irradiance = lights.iter().map(irradiance).sum::<f64>() + sun.as_ref().map_or(0.0, of_sun);
+        if irradiance > 0.0 && lumens_a_watt != 1.0 {
+            notes.say(format!(
+                "Blender wrote its lamps as {lumens_a_watt} lumens a watt, and what else shines in watts: they are watts again"
+            ));
+        }
         let mut lamps = Lamps { ball: None, entities: Vec::new(), sun, radiance: irradiance / std::f64::consts::PI };
         if lights.is_empty() {
             return Ok(lamps);
@@ -110,8 +119,8 @@ fn disc_sr(angle_deg: f32) -> f64 {
     std::f64::consts::PI * (f64::from(angle_deg).to_radians() / 2.0).sin().powi(2)
 }
 
-/// A directional light as a disc as wide as the sun, of the same irradiance: lux are taken as W m^-2.
-fn distant(document: &Document, light: &Light, stand: &Stand, notes: &mut Notes) -> Result<Sun> {
+/// A directional light of that irradiance as a disc as wide as the sun.
+fn distant(document: &Document, irradiance: Vec3, stand: &Stand, notes: &mut Notes) -> Result<Sun> {
     let place = || format!("nodes[{}]", stand.node);
     if !stand.motion.is_empty() {
         notes.leave_out("movements of directional lights (they shine as they do at rest)");
@@ -119,7 +128,7 @@ fn distant(document: &Document, light: &Light, stand: &Stand, notes: &mut Notes)
     let toward = stand.rest.matrix3.z_axis.try_normalize();
     let toward =
         toward.ok_or_else(|| document.fail(place(), "it squeezes space flat, so its light has no direction"))?;
-    let radiance = intensity(light) / disc_sr(SUN_DEG) as f32;
+    let radiance = irradiance / disc_sr(SUN_DEG) as f32;
     if radiance.max_element() > RADIANCE_LIMIT {
         return Err(document.fail(place(), "its light is too bright for a disc as wide as the sun"));
     }
@@ -148,7 +157,10 @@ fn ball(stand: &Stand, radius_m: f64, is_spot: bool) -> EntityData {
     }
 }
 
-/// Intensity in candela a channel.
-fn intensity(light: &Light) -> Vec3 {
-    Vec3::from(light.color) * light.intensity
+/// What the file's candela and lux are of W sr^-1 and W m^-2. Blender's exporter turns the watts of its lamps into
+/// lumens, and leaves the radiance of surfaces as it is; its importer turns lamps back.
+fn lumens_a_watt(document: &Document) -> f32 {
+    let generator = document.root.asset.generator.as_deref();
+    let is_of_blender = generator.is_some_and(|name| name.contains("Blender I/O"));
+    if is_of_blender { BLENDER_LUMENS_A_WATT } else { 1.0 }
 }

@@ -108,12 +108,7 @@ impl Part {
                 (b - a).cross(c - a) / 2.0
             })
         };
-        let mean = corners().sum::<DVec3>() / (3 * triangles.len()) as f64;
-        let spread = corners().fold(DMat3::ZERO, |sum, corner| {
-            let off = corner - mean;
-            sum + DMat3::from_cols(off.x * off, off.y * off, off.z * off)
-        });
-        let x = longest_axis(spread);
+        let x = longest_axis(corners);
         let is_side = |normal: &DVec3| normal.dot(x).abs() < END * normal.length();
         let widest = sides().filter(is_side).max_by(|a, b| a.length_squared().total_cmp(&b.length_squared()));
         let y = widest.unwrap_or(x.any_orthonormal_vector()).reject_from_normalized(x);
@@ -150,7 +145,12 @@ impl Part {
 }
 
 /// The axis along which places spread most: power iteration.
-fn longest_axis(spread: DMat3) -> DVec3 {
+pub fn longest_axis<P: Iterator<Item = DVec3>>(places: impl Fn() -> P) -> DVec3 {
+    let mean = places().sum::<DVec3>() / places().count() as f64;
+    let spread = places().fold(DMat3::ZERO, |sum, place| {
+        let off = place - mean;
+        sum + DMat3::from_cols(off.x * off, off.y * off, off.z * off)
+    });
     let longest = |a: &DVec3, b: &DVec3| a.length_squared().total_cmp(&b.length_squared());
     let start = (0..3).map(|axis| spread.col(axis)).max_by(longest).unwrap_or(DVec3::X);
     (0..32).fold(start.normalize_or(DVec3::X), |axis, _| (spread * axis).normalize_or(DVec3::X))

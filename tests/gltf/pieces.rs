@@ -103,6 +103,9 @@ fn lamps_of_several_bulbs_are_several_lamps() {
         1,
         "a thick ring is not bent"
     );
+    // Its triangles are as long as itself.
+    let tube = generate::tube(&[Vec3::ZERO, 1.2 * Vec3::Z], 0.016, 16);
+    assert_eq!(meshes(&[(&tube, Vec3::ZERO)], glow()).len(), 1, "a tube is not bent");
 }
 
 /// The walls of a room are rectangles of their own; a box that is open, seen from outside, is none.

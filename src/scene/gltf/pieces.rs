@@ -6,7 +6,7 @@ use glam::{Mat3, Vec3};
 
 use super::join::{Candidate, halve};
 use crate::asset::Mesh;
-use crate::asset::bars::{self, BARS_LIMIT};
+use crate::asset::bars::{self, BARS_LIMIT, longest_axis};
 use crate::asset::mesh::area_m2;
 use crate::asset::topology::{self, loose, subset};
 
@@ -34,6 +34,8 @@ const NEIGHBOURS_LIMIT: usize = 4096;
 /// axes than this: a straight tube has 0.8 of the box's area, a ring of neon 0.2, an eighth of it 0.54.
 const THIN: f32 = 0.5;
 const BENT: f32 = 0.6;
+/// Length of a half of a bent lamp at most, as a share of the whole.
+const HALVED: f32 = 0.8;
 /// Triangles of a bent lamp at least, and most halvings of it.
 const BENT_TRIANGLES: usize = 16;
 const HALVINGS: u32 = 4;
@@ -253,7 +255,13 @@ fn unbend(positions: &[Vec3], triangles: &[[u32; 3]], piece: &[u32], halvings: u
     let middle = 3.0 * (low.x + 0.5 * size.x);
     let is_before = |triangle: &u32| along(&triangles[*triangle as usize]).iter().map(|at| at.x).sum::<f32>() < middle;
     let (before, behind): (Vec<u32>, Vec<u32>) = piece.iter().copied().partition(is_before);
-    if halvings == 0 || !is_bent || before.is_empty() || behind.is_empty() {
+    let length = |half: &[u32]| {
+        let places = || half.iter().flat_map(|triangle| along(&triangles[*triangle as usize])).map(|at| at.x);
+        places().fold(f32::MIN, f32::max) - places().fold(f32::MAX, f32::min)
+    };
+    // Triangles as long as a tube are in neither half of it.
+    let is_halved = || [&before, &behind].into_iter().all(|half| !half.is_empty() && length(half) < HALVED * size.x);
+    if halvings == 0 || !is_bent || !is_halved() {
         return out.push(piece.to_vec());
     }
     unbend(positions, triangles, &before, halvings - 1, out);
@@ -263,10 +271,9 @@ fn unbend(positions: &[Vec3], triangles: &[[u32; 3]], piece: &[u32], halvings: u
 /// Axes of a piece, from its longest extent to its shortest.
 fn own_axes(positions: &[Vec3], piece: &[[u32; 3]]) -> Mat3 {
     let corners = || piece.iter().flatten().map(|v| positions[*v as usize]);
-    let farthest = |from: Vec3| corners().max_by(|a, b| a.distance(from).total_cmp(&b.distance(from))).unwrap_or(from);
-    let end = farthest(positions[piece[0][0] as usize]);
-    let x = (farthest(end) - end).normalize_or(Vec3::X);
-    let across = |corner: Vec3| (corner - end).reject_from_normalized(x);
+    let x = longest_axis(|| corners().map(|corner| corner.as_dvec3())).as_vec3();
+    let middle = corners().sum::<Vec3>() / (3 * piece.len()) as f32;
+    let across = |corner: Vec3| (corner - middle).reject_from_normalized(x);
     let y = corners().map(across).max_by(|a, b| a.length().total_cmp(&b.length())).unwrap_or_default();
     let y = y.try_normalize().unwrap_or_else(|| x.any_orthonormal_vector());
     Mat3::from_cols(x, y, x.cross(y))

@@ -1,10 +1,12 @@
 // What a surface mirrors, from the pictures that are drawn for it: src/draw/mirror.rs.
 layout(binding = MIRROR_BINDING) uniform sampler2D mirror_levels; // alpha: 1, or 0 where nothing stands
-layout(binding = MIRROR_BINDING + 1) uniform sampler2D mirror_far; // what depth leaves of 1
+layout(binding = MIRROR_BINDING + 1) uniform sampler2D mirror_far; // glsl/mirror_far.frag
 
 // Shares of the way behind the mirror: less is that of something which touches it, and so many times more is beyond.
 const float TOUCHES = 0.1;
 const float PAST_GAP = 4.0;
+// Least share of a lobe that stands for all of it.
+const float LEAST_KNOWN = 0.02;
 // Widths of texels, over that of slopes, whose blurs with these weights have the same share within any radius as slopes
 // of GGX have, p^2 / (1 + p^2), within 0.03; one alone, of 1.8, within 0.13.
 const vec2 LOBE_WIDTHS = vec2(1.24, 4.26);
@@ -63,11 +65,14 @@ vec4 mirrored_light(GlossEntity entity, int mirror, float alpha) {
         far = min(far, textureLod(mirror_far, within_part(place, ends, level) / size, level).x);
     }
     vec4 sum = vec4(0.0);
+    float whole = 0.0; // share of the lobe that the picture knows of
     for (uint i = 0; i < 2; i++) {
         float level = blur_level(LOBE_WIDTHS[i] * alpha * entity.mirror_view.w * min(far * scale, 1.0));
-        sum += LOBE_WEIGHTS[i] * textureLod(mirror_levels, within_part(place, ends, level) / size, level);
+        vec2 at = within_part(place, ends, level) / size;
+        sum += LOBE_WEIGHTS[i] * textureLod(mirror_levels, at, level);
+        whole += LOBE_WEIGHTS[i] * textureLod(mirror_far, at, level).y;
     }
-    return sum;
+    return sum / max(whole, LEAST_KNOWN);
 }
 
 #if PROBES

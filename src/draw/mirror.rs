@@ -16,6 +16,7 @@ use crate::error::Result;
 use crate::gpu::{Access, Bind, Commands, Device, GraphicsPipeline, GraphicsState, Image, ImageShape, Target, Texture};
 use crate::shaders::{Library, ShaderPermutation};
 use ash::vk;
+use bytemuck::{Pod, Zeroable};
 use glam::Vec4;
 use std::collections::HashSet;
 use std::sync::Arc;
@@ -32,7 +33,7 @@ pub const PROBE_SPREAD: f64 = 3.2;
 /// Texels beside its place that a pixel may read: filters of the coarsest level reach three quarters so far, and faces that
 /// are not quite flat stick out of their rectangles.
 pub const REACH: u32 = 2 * COARSEST;
-/// Pixels of a picture up to which mirrors may have as many: a mirror takes 84 bytes for each.
+/// Pixels of a picture up to which mirrors may have as many: a mirror takes 89 bytes for each.
 const MOST_FINE_PX: u32 = 1920 * 1200;
 /// Least cosine of the angle between a pixel's normal and the plane's. What this leaves of 1 is how far off the plane a
 /// pixel may lie, over its distance from the eye.
@@ -49,6 +50,16 @@ pub const PROBE_LEVEL: u32 = 4;
 const PROBE_COARSEST: u32 = 1 << PROBE_LEVEL;
 /// Least width of its pictures, where there is room.
 const LEAST_SIDE: u32 = 64;
+
+/// What is infinitely far, and does not count.
+const NOWHERE: [f32; 4] = [1.0, 0.0, 0.0, 0.0];
+
+#[repr(C)]
+#[derive(Clone, Copy, Pod, Zeroable)]
+struct FarPush {
+    edges: [[f32; 4]; 4],
+    area: [f32; 4],
+}
 
 /// What may be mirrors in pictures of a scene.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -67,7 +78,7 @@ pub fn finest_side(roughness: f64) -> f64 {
 /// What mirrors show, in one picture.
 pub struct Mirrors {
     draw: Draw,
-    /// What depth leaves of 1.
+    /// What depth leaves of 1, and what of the picture counts.
     far: Image,
     to_far: GraphicsPipeline,
     /// Levels of detail of the picture, and of that.
@@ -105,7 +116,7 @@ impl Mirrors {
         let light = light.map(|light| light.beside(all)).transpose()?;
         let draw = Draw { light, ..Draw::new(device, library, all, Antialias::None, lights)? };
         let shape = draw.picture.shape;
-        let of_far = ImageShape { format: vk::Format::R16_SFLOAT, ..shape };
+        let of_far = ImageShape { format: vk::Format::R16G16_SFLOAT, ..shape };
         let [vertex, fragment] = ["show.vert", "mirror_far.frag"].map(|file| ShaderPermutation::new(file, 4));
         let [vertex, fragment] = [library.shader(&vertex)?, library.shader(&fragment)?];
         let state = GraphicsState::plain(of_far.format);
@@ -168,10 +179,13 @@ impl Mirrors {
         self.draw.record(commands, viewports, Vec4::ZERO, MOST_RADIANCE)?;
         commands.image_barrier(&self.draw.depth, Some(Access::DepthWrite), Access::GraphicsSampled);
         commands.image_barrier(&self.far, None, Access::ColorWrite);
-        let target = Target { color: &self.far, second: None, clear: None, depth: None, resolve: None };
+        let target = Target { color: &self.far, second: None, clear: Some(NOWHERE), depth: None, resolve: None };
         commands.render(&target, |drawing| {
-            drawing.area([0, 0, width, self.far.shape.height]);
-            drawing.screen(&self.to_far, &[Bind::Image(&self.draw.depth)], &())
+            viewports.iter().try_for_each(|viewport| {
+                drawing.part_of(viewport.area, viewport.drawn);
+                let push = FarPush { edges: viewport.edges, area: viewport.area.map(|px| px as f32) };
+                drawing.screen(&self.to_far, &[Bind::Image(&self.draw.depth)], &push)
+            })
         })?;
         for (image, levels) in [&self.draw.picture, &self.far].into_iter().zip(&self.levels) {
             commands.image_barrier(image, Some(Access::ColorWrite), Access::TransferRead);

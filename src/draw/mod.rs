@@ -220,7 +220,12 @@ pub struct DrawnViewport<'d> {
     pub sky: Option<SeenSky<'d>>,
     /// Which of the lines that pass "smooth" reads belong to this region.
     pub lines: Range<u32>,
+    /// Edges of the mirror whose picture this is, as glsl/mirror_far.frag has them.
+    pub edges: [[f32; 4]; 4],
 }
+
+/// Edges within which everything lies.
+pub const EVERYWHERE: [[f32; 4]; 4] = [[0.0, 0.0, 1.0, 0.0]; 4];
 
 /// How pictures evaluate sharp lights themselves.
 #[derive(Clone, Copy)]

@@ -9,7 +9,7 @@ use crate::asset::mesh::Mesh;
 use crate::bounce::Bounces;
 use crate::draw::mirror::{Mirrored, PROBE_ZOOM, REACH, finest_side};
 use crate::draw::triangles::Detail;
-use crate::draw::{DrawnViewport, PictureLights};
+use crate::draw::{DrawnViewport, EVERYWHERE, PictureLights};
 use crate::gloss::{PIXEL_ROUGHNESS, brdf};
 use crate::layout::GlossEntity;
 use crate::lists::sight::SightCamera;
@@ -73,6 +73,8 @@ struct Candidate {
     place: Place,
     /// Those that have faces there.
     entities: Vec<usize>,
+    /// Corners of a rectangle around the faces of a plane, in order.
+    corners: [DVec3; 4],
     /// Share of the picture's light that it reflects.
     score: f64,
     /// Least and largest corner of its faces in a picture that lies between -1 and 1.
@@ -97,6 +99,8 @@ enum Place {
 struct Plane {
     /// What of its picture is read: left, top, width and height in texels of its part.
     read: [u32; 4],
+    /// Edges of its rectangle as glsl/mirror_far.frag has them.
+    edges: [[f32; 4]; 4],
     camera: SightCamera,
     /// Unit normal on the eye's side, and offset from the world's origin.
     plane: DVec4,
@@ -188,6 +192,32 @@ fn share_of_picture(flat: &[DVec2]) -> f64 {
     twice.abs() / 8.0
 }
 
+/// The rectangle around two of a plane, along the sides of the first.
+fn around(first: [DVec3; 4], second: [DVec3; 4]) -> [DVec3; 4] {
+    let [u, v] = [first[1] - first[0], first[3] - first[0]];
+    let place = |corner: &DVec3| {
+        let way = *corner - first[0];
+        DVec2::new(way.dot(u) / u.length_squared(), way.dot(v) / v.length_squared())
+    };
+    let places = second.iter().map(place);
+    let (low, high) = places.fold((DVec2::ZERO, DVec2::ONE), |(low, high), at| (low.min(at), high.max(at)));
+    let at = |x: f64, y: f64| first[0] + x * u + y * v;
+    [at(low.x, low.y), at(high.x, low.y), at(high.x, high.y), at(low.x, high.y)]
+}
+
+/// The lines in a picture, which lies between -1 and 1, through neighbouring corners of a rectangle: positive within.
+fn edges(clip_from_world: DMat4, corners: [DVec3; 4]) -> [[f32; 4]; 4] {
+    let flat = corners.map(|corner| {
+        let clip = clip_from_world * corner.extend(1.0);
+        DVec3::new(clip.x, clip.y, clip.w)
+    });
+    let middle: DVec3 = flat.iter().sum();
+    std::array::from_fn(|i| {
+        let line = flat[i].cross(flat[(i + 1) % 4]).normalize_or_zero();
+        (line * line.dot(middle).signum()).extend(0.0).as_vec4().to_array()
+    })
+}
+
 /// The matrix of a reflection at a plane.
 fn reflection(plane: DVec4) -> DMat4 {
     let normal = plane.truncate();
@@ -206,8 +236,9 @@ impl Mirror {
 }
 
 impl Plane {
-    /// The mirror of a plane as a camera sees it; `part` is the size of its picture in texels.
-    fn new(seen: &SightCamera, plane: DVec4, part: [u32; 2], read: [u32; 4]) -> Self {
+    /// The mirror of a plane, of which the rectangle between `corners` mirrors, as a camera sees it; `part` is the size of
+    /// its picture in texels.
+    fn new(seen: &SightCamera, plane: DVec4, corners: [DVec3; 4], part: [u32; 2], read: [u32; 4]) -> Self {
         let height_m = plane.dot(seen.eye.extend(1.0));
         let eye = seen.eye - 2.0 * height_m * plane.truncate();
         let mut clip = (seen.clip_from_world * reflection(plane)).transpose();
@@ -218,8 +249,8 @@ impl Plane {
             let toward = near.truncate() / near.w - seen.eye;
             -plane.truncate().dot(toward) / (seen.clip_from_world * toward.extend(0.0)).w
         };
-        let corners = [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)];
-        let steepest = corners.into_iter().map(|(x, y)| steepness(x, y)).fold(1e-3, f64::max);
+        let ends = [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)];
+        let steepest = ends.into_iter().map(|(x, y)| steepness(x, y)).fold(1e-3, f64::max);
         // Depth is 1 on the plane and falls with the distance from it over the view depth: what lies behind the plane
         // is clipped.
         let depth_step = 1.0 / steepest;
@@ -227,13 +258,14 @@ impl Plane {
         clip.z_axis = clip.w_axis - depth_step * above;
         let camera =
             SightCamera { clip_from_world: clip.transpose(), eye, near_m: seen.near_m, size: part, samples: false };
-        Plane { read, camera, plane, height_m, depth_step }
+        Plane { read, edges: edges(seen.clip_from_world, corners), camera, plane, height_m, depth_step }
     }
 }
 
 impl Candidate {
     /// Adds another one with the same plane.
     fn join(&mut self, other: Candidate) {
+        self.corners = around(self.corners, other.corners);
         self.entities.extend(other.entities);
         self.score += other.score;
         self.bounds = [self.bounds[0].min(other.bounds[0]), self.bounds[1].max(other.bounds[1])];
@@ -279,6 +311,7 @@ impl Frame {
             let candidate = Candidate {
                 place: Place::Plane(plane),
                 entities: vec![face.entity],
+                corners,
                 score: self.reflectance(face.entity, height_m / distance_m) * share_of_picture(&flat),
                 bounds: [
                     flat.iter().copied().fold(DVec2::INFINITY, DVec2::min),
@@ -309,6 +342,7 @@ impl Frame {
             found.push(Candidate {
                 place: Place::Ball(centre, radius_m),
                 entities: vec![*entity],
+                corners: [centre; 4],
                 score: self.reflectance(*entity, 0.5) * share_of_picture(&within(seen.clip_from_world, corners)),
                 bounds: [-DVec2::ONE, DVec2::ONE],
             });
@@ -324,13 +358,14 @@ impl Frame {
         // None comes or goes in a step.
         let least = found.get(mirrors.count()).map_or(0.0, |candidate| candidate.score).max(LEAST_SHARE);
         let shown = found.into_iter().filter(|candidate| candidate.score > least).take(mirrors.count());
-        let mirror = |Candidate { place, entities, score, bounds }: Candidate| {
+        let mirror = |Candidate { place, entities, corners, score, bounds }: Candidate| {
             let roughness = |entity: &usize| self.scene.entities[*entity].gloss.map_or(0.0, |gloss| gloss.roughness);
             let alphas = entities.iter().map(|entity| f64::from(roughness(entity)).powi(2));
             let least_px = focal_px * alphas.fold(f64::INFINITY, f64::min);
             let shape = match place {
                 Place::Plane(plane) => {
-                    Shape::Plane(Plane::new(&seen, plane, mirrors.part, texels_within(bounds, mirrors.part)))
+                    let read = texels_within(bounds, mirrors.part);
+                    Shape::Plane(Plane::new(&seen, plane, corners, mirrors.part, read))
                 }
                 Place::Ball(centre, radius_m) => {
                     // As wide as it is seen, and no finer than its blur.
@@ -391,15 +426,15 @@ impl Frame {
                         entity.emission = Vec3::ZERO;
                     }
                 }
-                let (area, drawn) = match &mirror.shape {
+                let (area, drawn, edges) = match &mirror.shape {
                     Shape::Plane(plane) => {
                         let area = mirrors.area(number);
                         let [left, top, width, height] = plane.read;
-                        (area, [area[0] + left, area[1] + top, width, height])
+                        (area, [area[0] + left, area[1] + top, width, height], plane.edges)
                     }
                     Shape::Probe(probe) => {
                         let area = mirrors.face_area(number, face, probe.side);
-                        (area, area)
+                        (area, area, EVERYWHERE)
                     }
                 };
                 DrawnViewport {
@@ -411,6 +446,7 @@ impl Frame {
                     pixel: self.pixel_light().filter(|_| mirror.crisp),
                     sky: None,
                     lines: 0..0,
+                    edges,
                 }
             };
             mirror.cameras().iter().enumerate().map(picture).collect::<Vec<_>>()
@@ -499,7 +535,8 @@ mod tests {
     #[test]
     fn the_mirrored_camera_sees_what_the_eye_sees_in_the_floor() {
         let seen = seen();
-        let mirror = Plane::new(&seen, DVec4::Y, [64, 64], [0, 0, 64, 64]);
+        let corners = [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)].map(|(x, z)| DVec3::new(x, 0.0, z));
+        let mirror = Plane::new(&seen, DVec4::Y, corners, [64, 64], [0, 0, 64, 64]);
         let through = |p: DVec3| mirror.camera.clip_from_world * p.extend(1.0);
         for point in [DVec3::new(0.2, 0.3, -0.5), DVec3::new(-0.4, 0.8, -3.0), DVec3::new(0.0, 2.0, -40.0)] {
             let clip = through(point);
@@ -512,6 +549,14 @@ mod tests {
             let behind = (1.0 - clip.z / clip.w) / (mirror.depth_step * mirror.height_m) * through(at).w;
             // Distances count from where nothing is clipped.
             assert!((behind - (1.0 - crossing)).abs() < CLIPPED, "{point}: {behind} {crossing}");
+        }
+        // Places of the floor lie within all edges where they lie in the rectangle.
+        for (place, is_within) in [([0.3, -0.8], true), ([-0.9, 0.9], true), ([1.1, 0.2], false), ([0.0, -1.3], false)]
+        {
+            let clip = seen.clip_from_world * DVec4::new(place[0], 0.0, place[1], 1.0);
+            let at = (DVec3::new(clip.x, clip.y, clip.w) / clip.w).as_vec3();
+            let positive = |edge: &[f32; 4]| glam::Vec4::from(*edge).truncate().dot(at) > 0.0;
+            assert_eq!(mirror.edges.iter().all(positive), is_within, "{place:?}");
         }
         let below = through(DVec3::new(0.2, -0.1, -0.5));
         assert!(below.z > below.w, "{below}");

@@ -9,7 +9,7 @@ use crate::asset::edges::Edges;
 use crate::draw::pixel_light::PixelLight;
 use crate::draw::smooth::Lines;
 use crate::draw::triangles::DrawnSurface;
-use crate::draw::{Antialias, Draw, DrawnViewport, PictureLights};
+use crate::draw::{Antialias, Draw, DrawnViewport, EVERYWHERE, PictureLights};
 use crate::error::Result;
 use crate::gpu::{Buffer, BufferKind, Device, Image};
 use crate::scene::{Placement, Scene};
@@ -92,6 +92,7 @@ impl Frame {
                 .filter(|_| viewport.shows_light())
                 .map(|sky| sky.seen(&self.scene.data.camera, viewport.area)),
             lines: lines.clone(),
+            edges: EVERYWHERE,
         };
         PictureWork {
             draw: &self.picture.draw,

@@ -8,7 +8,7 @@ use shadow_fields::bake::assemble::Assemble;
 use shadow_fields::bake::capture::Capture;
 use shadow_fields::bake::project::Project;
 use shadow_fields::bake::raster::Raster;
-use shadow_fields::bake::silhouette::{Silhouette, SilhouetteOptions};
+use shadow_fields::bake::silhouette::SilhouetteOptions;
 use shadow_fields::bounce::boxes::hidden_row;
 use shadow_fields::bounce::movers::{distant_row, movers_row, outgoing_row};
 use shadow_fields::bounce::{bounce_row, runs_row};
@@ -35,13 +35,7 @@ fn baking() -> Vec<ShaderPermutation> {
     let project = BANDS.flat_map(|bands| KINDS.map(|kind| Project::row(bands, kind)));
     let assemble = [Storage::F16, Storage::F32].map(Assemble::row);
     let capture = KINDS.into_iter().flat_map(Capture::rows);
-    project
-        .chain([Raster::row()])
-        .chain(assemble)
-        .chain(capture)
-        .chain(Silhouette::permutations(32, 128, 16, false))
-        .chain(Silhouette::permutations(16, 64, 16, true))
-        .collect()
+    project.chain([Raster::row()]).chain(assemble).chain(capture).collect()
 }
 
 fn bouncing() -> Vec<ShaderPermutation> {

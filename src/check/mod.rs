@@ -12,7 +12,6 @@ pub mod merge;
 pub mod project;
 pub mod sharp;
 pub mod show;
-pub mod silhouette;
 
 use crate::bake::Baker;
 use crate::error::Result;
@@ -55,11 +54,10 @@ impl CheckRow {
 type PassCheck = fn(&Baker, &mut dyn FnMut(CheckRow)) -> Result<()>;
 
 /// Every pass in the order of execution, by the one word that names it everywhere.
-pub const PASSES: [(&str, PassCheck); 11] = [
+pub const PASSES: [(&str, PassCheck); 10] = [
     ("capture", capture::rows),
     ("project", project::rows),
     ("assemble", assemble::rows),
-    ("silhouette", silhouette::rows),
     ("merge", merge::rows),
     ("sharp", sharp::rows),
     ("bounce", bounce::rows),

@@ -22,7 +22,7 @@ pub const FIELD_MAGIC: [u8; 8] = *b"SHFIELD\n";
 pub const SURFACES_MAGIC: [u8; 8] = *b"SHSURFA\n";
 pub const VOLUME_MAGIC: [u8; 8] = *b"SHVOLUM\n";
 /// Version that this program writes and reads. It increases whenever the meaning of header or payload changes.
-pub const VERSION: u32 = 14;
+pub const VERSION: u32 = 15;
 const HEADER_LIMIT: u64 = 64 << 10;
 /// Largest payload that is read: 4 GiB.
 pub const PAYLOAD_LIMIT: u64 = 4 << 30;

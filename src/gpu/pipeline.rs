@@ -160,8 +160,6 @@ impl ComputePipeline {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Keeps {
     Last,
-    /// The largest, also of what the attachment held before.
-    Largest,
     /// The last over what was there before, by its alpha, with which its colour is premultiplied.
     Over,
     Depth,
@@ -288,10 +286,6 @@ fn vertex_layout(
 }
 
 fn color_blend(keeps: Keeps) -> vk::PipelineColorBlendAttachmentState {
-    let operation = match keeps {
-        Keeps::Largest => vk::BlendOp::MAX,
-        Keeps::Last | Keeps::Depth | Keeps::Over | Keeps::ColorOver => vk::BlendOp::ADD,
-    };
     let written = match keeps {
         Keeps::Depth => vk::ColorComponentFlags::empty(),
         Keeps::ColorOver => vk::ColorComponentFlags::R | vk::ColorComponentFlags::G | vk::ColorComponentFlags::B,
@@ -304,8 +298,8 @@ fn color_blend(keeps: Keeps) -> vk::PipelineColorBlendAttachmentState {
         .dst_color_blend_factor(vk::BlendFactor::ONE_MINUS_SRC_ALPHA)
         .src_alpha_blend_factor(vk::BlendFactor::ONE)
         .dst_alpha_blend_factor(vk::BlendFactor::ONE_MINUS_SRC_ALPHA)
-        .color_blend_op(operation)
-        .alpha_blend_op(operation)
+        .color_blend_op(vk::BlendOp::ADD)
+        .alpha_blend_op(vk::BlendOp::ADD)
 }
 
 fn attribute_format(components: u32) -> vk::Format {

@@ -30,7 +30,7 @@ use std::sync::{Arc, OnceLock};
 use std::time::Instant;
 
 /// Counts in every name of the cache: another number where a bake of surfaces computes something else.
-const VERSION: u32 = 46;
+const VERSION: u32 = 47;
 /// How far towards the middle of its triangles a vertex is seen from, as a share of the way: the light of a crease is
 /// that just inside each face. Where meshes are left as they are, so are the places from which they are seen.
 const NUDGE: f32 = 0.02;
@@ -54,7 +54,7 @@ const CRISP_RAD: f64 = 0.05;
 const SUN_RAYS: [[f64; 2]; 5] = [[0.0, 0.0], [0.8, 0.0], [0.0, 0.8], [-0.8, 0.0], [0.0, -0.8]];
 /// Of the vertices to which surfaces may grow one in so many is added at least, however many there were: a floor below a
 /// fine statue is lit at four of its own.
-const LEAST_ADDED: usize = 4;
+const LEAST_ADDED: usize = 2;
 /// A lamp lights a member from close by that is so near its middle, in the member's bounding radii, is no larger than so
 /// many of the lamp's, and than this share of the group's.
 const LIT_CLOSE: f64 = 1.5;
@@ -69,6 +69,8 @@ pub(super) const BURIED_BLOCKED: f64 = 0.35;
 /// than such a share of their extent.
 const LEAST_COMMON: f32 = 0.5;
 const MOST_HEIGHT: f32 = 0.35;
+/// Share of its height above a vertex that a point keeps above the triangles of a hollow on its way along the surface.
+const HOLLOW: f32 = 0.5;
 /// Places on the way from a buried vertex to the middle of a triangle where one that is not may be.
 const WAYS_OUT: [f32; 5] = [0.06, 0.15, 0.3, 0.5, 0.8];
 /// The same on the way to the vertices beside it, where the middles of all its triangles are buried too.
@@ -618,17 +620,33 @@ impl GroupSpace<'_> {
         for (position, normal) in positions.iter().zip(normals) {
             *alike.entry(bits(position, normal)).or_insert(0) += 1;
         }
-        let nudge = |(((sum, count), normal), position): (((Vec3, f32), &Vec3), &Vec3)| {
+        let inward = |((sum, count), normal): (&(Vec3, f32), &Vec3)| {
             let inward = sum / count.max(1.0);
-            let along = inward_share * (inward - inward.dot(*normal) * *normal);
+            inward_share * (inward - inward.dot(*normal) * *normal)
+        };
+        let mut alongs: Vec<Vec3> = sums.iter().zip(normals).map(inward).collect();
+        // In a hollow, where a triangle rises above the tangent plane, no farther than to be before that triangle.
+        let mut shares = vec![1.0_f32; positions.len()];
+        for triangle in triangles {
+            let [a, b, c] = triangle.map(|v| positions[v as usize]);
+            let side = (b - a).cross(c - a).normalize_or_zero();
+            for v in triangle.map(|v| v as usize) {
+                let [below, above] = [-side.dot(alongs[v]), off * side.dot(normals[v])];
+                if below > 0.0 && above > 0.0 {
+                    shares[v] = shares[v].min(HOLLOW * above / below);
+                }
+            }
+        }
+        alongs.iter_mut().zip(&shares).for_each(|(along, share)| *along *= *share);
+        let nudge = |(((along, share), normal), position): (((Vec3, f32), &Vec3), &Vec3)| {
             let foot = *position + along + least * *normal;
             let reach = (off - least) * *normal;
-            let is_parted = off > least && alike[&bits(position, normal)] > 1;
+            let is_parted = off > least && share == 1.0 && alike[&bits(position, normal)] > 1;
             let stands = is_parted.then(|| self.first_between(&self.blocks, foot, foot + reach)).flatten();
             let share = |hit: BlockerHit| 0.5 * hit.distance / self.placed(foot).distance(self.placed(foot + reach));
             along + least * *normal + stands.map_or(1.0, share) * reach
         };
-        sums.into_par_iter().zip(normals).zip(positions).map(nudge).collect()
+        alongs.into_par_iter().zip(shares).zip(normals).zip(positions).map(nudge).collect()
     }
 
     /// A point of the member's frame as seen from where it is nudged to.

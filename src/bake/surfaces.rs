@@ -30,7 +30,7 @@ use std::sync::{Arc, OnceLock};
 use std::time::Instant;
 
 /// Counts in every name of the cache: another number where a bake of surfaces computes something else.
-const VERSION: u32 = 47;
+const VERSION: u32 = 48;
 /// How far towards the middle of its triangles a vertex is seen from, as a share of the way: the light of a crease is
 /// that just inside each face. Where meshes are left as they are, so are the places from which they are seen.
 const NUDGE: f32 = 0.02;
@@ -69,8 +69,10 @@ pub(super) const BURIED_BLOCKED: f64 = 0.35;
 /// than such a share of their extent.
 const LEAST_COMMON: f32 = 0.5;
 const MOST_HEIGHT: f32 = 0.35;
-/// Share of its height above a vertex that a point keeps above the triangles of a hollow on its way along the surface.
+/// Share of its height above a vertex that a point keeps above the triangles of a hollow on its way along the surface, and
+/// the sine from which on a triangle rises.
 const HOLLOW: f32 = 0.5;
+const RISES: f32 = 1e-3;
 /// Places on the way from a buried vertex to the middle of a triangle where one that is not may be.
 const WAYS_OUT: [f32; 5] = [0.06, 0.15, 0.3, 0.5, 0.8];
 /// The same on the way to the vertices beside it, where the middles of all its triangles are buried too.
@@ -626,22 +628,22 @@ impl GroupSpace<'_> {
         };
         let mut alongs: Vec<Vec3> = sums.iter().zip(normals).map(inward).collect();
         // In a hollow, where a triangle rises above the tangent plane, no farther than to be before that triangle.
-        let mut shares = vec![1.0_f32; positions.len()];
+        let mut shares: Vec<Option<f32>> = vec![None; positions.len()];
         for triangle in triangles {
             let [a, b, c] = triangle.map(|v| positions[v as usize]);
             let side = (b - a).cross(c - a).normalize_or_zero();
             for v in triangle.map(|v| v as usize) {
                 let [below, above] = [-side.dot(alongs[v]), off * side.dot(normals[v])];
-                if below > 0.0 && above > 0.0 {
-                    shares[v] = shares[v].min(HOLLOW * above / below);
+                if below > RISES * alongs[v].length() && above > 0.0 {
+                    shares[v] = Some(shares[v].unwrap_or(1.0).min(HOLLOW * above / below));
                 }
             }
         }
-        alongs.iter_mut().zip(&shares).for_each(|(along, share)| *along *= *share);
-        let nudge = |(((along, share), normal), position): (((Vec3, f32), &Vec3), &Vec3)| {
+        alongs.iter_mut().zip(&shares).for_each(|(along, share)| *along *= share.unwrap_or(1.0));
+        let nudge = |(((along, hollow), normal), position): (((Vec3, Option<f32>), &Vec3), &Vec3)| {
             let foot = *position + along + least * *normal;
             let reach = (off - least) * *normal;
-            let is_parted = off > least && share == 1.0 && alike[&bits(position, normal)] > 1;
+            let is_parted = off > least && hollow.is_none() && alike[&bits(position, normal)] > 1;
             let stands = is_parted.then(|| self.first_between(&self.blocks, foot, foot + reach)).flatten();
             let share = |hit: BlockerHit| 0.5 * hit.distance / self.placed(foot).distance(self.placed(foot + reach));
             along + least * *normal + stands.map_or(1.0, share) * reach
@@ -1205,5 +1207,31 @@ impl GroupPlan {
             return Vec::new();
         }
         members.iter().filter_map(|&member| self.entities.get(member as usize)).map(|&entity| entity as u32).collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A wall and the flare at its foot, each with its own vertices in the groove, which have one normal: as files have
+    /// them whose sides are islands of a texture.
+    #[test]
+    fn vertices_of_a_groove_are_seen_from_before_both_sides() {
+        let corners = [[1.0, 0.0], [0.0, 0.0], [0.0, 0.0], [-1.0, 1.0]];
+        let positions: Vec<Vec3> =
+            corners.iter().flat_map(|[y, z]| [-1.0, 1.0].map(|x| Vec3::new(x, *y, *z))).collect();
+        let sides = [Vec3::Z, Vec3::new(0.0, 1.0, 1.0).normalize()];
+        let groove = (sides[0] + sides[1]).normalize();
+        let normals = [sides[0], groove, groove, sides[1]].iter().flat_map(|normal| [*normal; 2]).collect();
+        let triangles = [0, 4].iter().flat_map(|v| [[*v, v + 2, v + 1], [v + 1, v + 2, v + 3]]).collect();
+        let mesh = Arc::new(Mesh::new("groove", positions, normals, None, triangles).unwrap());
+        let alone = GroupPlan::alone(&mesh, &Options::default(), Wanted::BOTH);
+        let plan = GroupPlan { refinement: Some((1000, false)), ..alone };
+        let group = Group::new(&plan);
+        let nudges = group.space(0).nudges(&mesh.positions, &mesh.normals, &mesh.triangles);
+        for (side, nudge) in sides.iter().flat_map(|side| nudges[2..6].iter().map(move |nudge| (side, nudge))) {
+            assert!(nudge.dot(*side) > 1e-4, "{nudge} before {side}");
+        }
     }
 }

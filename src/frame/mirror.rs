@@ -375,7 +375,9 @@ impl Frame {
                     Shape::Probe(Box::new(Probe::new(centre, radius_m, side)))
                 }
             };
-            Mirror { shape, share: ((score / least - 1.0) / FADE).min(1.0), crisp: least_px < CRISP_PX, entities }
+            // What is curved shows a scene small.
+            let crisp = matches!(shape, Shape::Plane(_)) && least_px < CRISP_PX;
+            Mirror { shape, share: ((score / least - 1.0) / FADE).min(1.0), crisp, entities }
         };
         shown.map(mirror).collect()
     }

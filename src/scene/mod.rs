@@ -174,6 +174,9 @@ impl Scene {
             return Self::parse(utf8(path, &bytes, FILE_LIMIT_BYTES, "scene")?, path, &embedded::read);
         }
         let bytes = read_file(path, FILE_LIMIT_BYTES)?;
+        if bytes.contains(&0) && path.extension().is_none_or(|ending| !ending.eq_ignore_ascii_case("toml")) {
+            return Err(Error::input(path, "scenes are .toml, .glb, .gltf or .obj files: export it as one of these"));
+        }
         Self::parse(utf8(path, &bytes, FILE_LIMIT_BYTES, "scene")?, path, &read_named)
     }
 

@@ -74,6 +74,17 @@ fn control_characters_do_not_reach_the_terminal() {
         assert_clean(&ran.stderr);
         assert_eq!((ran.code, ran.stderr.lines().count()), (4, 1), "{}", ran.stderr);
     }
+    // Files of other programs.
+    folder.write("s.blend", "BLENDER-v300\0\0");
+    let ran = folder.run("render s.blend -o p.png");
+    assert!(
+        ran.code == 4
+            && ran
+                .stderr
+                .ends_with("s.blend: scenes are .toml, .glb, .gltf or .obj files: export it as one of these\n"),
+        "{}",
+        ran.stderr
+    );
     // Results show names of files too, and are JSON where that is asked for.
     folder.write("m.gltf", r#"{ "asset": { "version": "2.0" }, "scenes": [{ "nodes": [] }] }"#);
     let name = "a\u{202e}b\u{85}c.toml";

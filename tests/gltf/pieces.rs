@@ -2,11 +2,12 @@
 
 use crate::common::{generate, inside_out, joined, part};
 use crate::model::{Model, bench};
-use glam::{Mat3, Quat, Vec3};
+use glam::{Mat3, Quat, Vec2, Vec3};
 use serde_json::json;
 use shadow_fields::asset::Mesh;
 use shadow_fields::scene::gltf::{self, Import};
 use shadow_fields::scene::{LightMethod, Lights, Scene};
+use std::f32::consts::TAU;
 use std::sync::Arc;
 
 fn load(model: &Model) -> (Import, Scene) {
@@ -104,7 +105,11 @@ fn lamps_of_several_bulbs_are_several_lamps() {
         "a thick ring is not bent"
     );
     // Its triangles are as long as itself.
-    let tube = generate::tube(&[Vec3::ZERO, 1.2 * Vec3::Z], 0.016, 16);
+    let ring = |z: f32| (0..16).map(move |k| (0.016 * Vec2::from_angle(TAU / 16.0 * k as f32)).extend(z));
+    let sides = (0..16).flat_map(|k| [[k, (k + 1) % 16, k + 16], [(k + 1) % 16, (k + 1) % 16 + 16, k + 16]]);
+    let caps = (1..15).flat_map(|k| [[0, k + 1, k], [16, k + 16, k + 17]]);
+    let tube = Mesh::new("tube", ring(0.0).chain(ring(1.2)).collect(), vec![], None, sides.chain(caps).collect());
+    let tube = tube.unwrap();
     assert_eq!(meshes(&[(&tube, Vec3::ZERO)], glow()).len(), 1, "a tube is not bent");
 }
 

@@ -1,7 +1,6 @@
 #version 460
 // The mean light that leaves the vertices of every run, by their areas, and passes lamps, which stand before them. A
-// workgroup has a run of the largest size, a thread one of the smallest: src/bounce/mod.rs. Runs consist of eight of the
-// next smaller ones.
+// workgroup has a run of the largest size, a thread one of the smallest: src/bounce/mod.rs.
 layout(local_size_x = 64) in;
 
 struct Block {
@@ -29,7 +28,7 @@ void main() {
     Block block = blocks[gl_WorkGroupID.x];
     uint i = gl_LocalInvocationID.x;
     vec4 sum = vec4(0.0);
-    for (uint k = RUN * i; k < min(RUN * i + RUN, block.vertex_count); k++) {
+    for (uint k = 8 * i; k < min(8 * i + 8, block.vertex_count); k++) {
         uint v = block.vertex_first + k;
         vec3 light = light_at(v).rgb;
 #if LAMPS
@@ -37,12 +36,12 @@ void main() {
 #endif
         sum += uintBitsToFloat(area_at(v)) * vec4(light, 1.0);
     }
-    if (RUN * i < block.vertex_count) {
+    if (8 * i < block.vertex_count) {
         run_light[block.small + i] = mean(sum);
     }
     small_sums[i] = sum;
     barrier();
-    if (8 * RUN * i < block.vertex_count) {
+    if (64 * i < block.vertex_count) {
         sum = vec4(0.0);
         for (uint k = 8 * i; k < 8 * i + 8; k++) {
             sum += small_sums[k];
@@ -53,7 +52,7 @@ void main() {
     barrier();
     if (i == 0) {
         sum = vec4(0.0);
-        for (uint k = 0; 8 * RUN * k < block.vertex_count; k++) {
+        for (uint k = 0; 64 * k < block.vertex_count; k++) {
             sum += middle_sums[k];
         }
         run_light[block.large] = mean(sum);

@@ -5,7 +5,6 @@
 //! space-filling curve would do worse: it leaps within some clusters, and a cluster that spans a leap has half of the
 //! scene on its list.
 
-use super::links::RUNS;
 use super::triangles::unit_positions;
 use crate::asset::mesh::Mesh;
 use crate::asset::topology::Sets;
@@ -17,8 +16,8 @@ use glam::Vec3;
 /// lists by 10 % at most.
 const NORMAL_WEIGHT: f32 = 1.25;
 /// Sizes of the runs that stay whole: groups whose lists are gathered together, clusters, and neighbours within a
-/// cluster, which light leaves together.
-const WHOLE: [usize; 3] = [GROUP_CLUSTERS * CLUSTER_VERTICES as usize, CLUSTER_VERTICES as usize, RUNS[0]];
+/// cluster, which share lines of the cache.
+const RUNS: [usize; 3] = [GROUP_CLUSTERS * CLUSTER_VERTICES as usize, CLUSTER_VERTICES as usize, 8];
 /// Below this number of vertices another thread costs more than it saves.
 const ALONE: usize = 1 << 14;
 
@@ -66,7 +65,7 @@ fn divided(points: &[Point], parts: &[u32]) -> Vec<u32> {
 }
 
 fn halve(points: &mut [Point]) {
-    let Some(run) = WHOLE.into_iter().find(|run| points.len() > *run) else { return };
+    let Some(run) = RUNS.into_iter().find(|run| points.len() > *run) else { return };
     let mut low = [f32::INFINITY; 6];
     let mut high = [f32::NEG_INFINITY; 6];
     for (point, _) in points.iter() {
@@ -108,7 +107,7 @@ mod tests {
         let has_both = |run: &&[u32]| run.iter().any(|v| *v < count) && run.iter().any(|v| *v >= count);
         let on_cut = |run: &[u32]| run.iter().any(|v| mesh.positions[*v as usize].x.abs() < 0.02);
         for cluster in order.chunks(CLUSTER_VERTICES as usize).filter(|cluster| on_cut(cluster)) {
-            assert!(cluster.chunks(RUNS[0]).filter(has_both).count() <= 1, "{cluster:?}");
+            assert!(cluster.chunks(8).filter(has_both).count() <= 1, "{cluster:?}");
         }
     }
 }

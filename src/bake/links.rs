@@ -12,9 +12,8 @@ use crate::shaders::ShaderPermutation;
 use glam::Vec3;
 use std::ops::Range;
 
-/// Vertices of a run, in the order of clusters. The smallest are a side of a box, and not two that face each other: what
-/// lights one would shine through it.
-pub const RUNS: [usize; 3] = [4, 32, 256];
+/// Vertices of a run, in the order of clusters: the smallest runs, clusters, and groups of those.
+pub const RUNS: [usize; 3] = [8, 64, 512];
 /// A run with a smaller share of the hemisphere becomes part of a larger one.
 const LEAST_SHARE: f32 = 1.0 / 64.0;
 /// Most links of a vertex. Where there are more, the largest take over the shares of the others.
@@ -231,7 +230,7 @@ mod tests {
     #[test]
     fn links_keep_the_share_of_all_rays_and_split_where_it_is_large() {
         let runs = Runs::new([1000, 70]);
-        assert_eq!(runs.count(), 250 + 32 + 4 + 18 + 3 + 1);
+        assert_eq!(runs.count(), 125 + 16 + 2 + 9 + 2 + 1);
         assert_eq!(runs.all().count() as u32, runs.count());
         assert_eq!(runs.all().last(), Some((1, 0, 70)));
         let all: Vec<_> = runs.all().collect();
@@ -241,17 +240,17 @@ mod tests {
         for (number, (member, first, count)) in (0..).zip(&all) {
             let parts: Vec<_> = runs.parts(number).map(|part| all[part as usize]).collect();
             let small = *first..first + RUNS[0].min(*count);
-            assert!(parts.is_empty() == (number < 250 || (286..304).contains(&number)), "{number} {small:?}");
+            assert!(parts.is_empty() == (number < 125 || (143..152).contains(&number)), "{number} {small:?}");
             assert!(parts.iter().all(|part| part.0 == *member && part.1 >= *first));
             assert!(parts.is_empty() || parts.iter().map(|part| part.2).sum::<usize>() == *count);
         }
         let mut rng = fastrand::Rng::with_seed(1);
-        // A tenth of the rays meet one smallest run, a third one of the next size, the others anything.
+        // A tenth of the rays meet one smallest run, a third one cluster, the others anything.
         let met: Vec<Met> = (0..600)
             .map(|i| {
                 let (member, place) = match i % 30 {
-                    0..3 => (1, 4 + rng.u32(0..4)),
-                    3..13 => (0, 128 + rng.u32(0..32)),
+                    0..3 => (1, 8 + rng.u32(0..8)),
+                    3..13 => (0, 128 + rng.u32(0..64)),
                     _ => (0, 256 + rng.u32(0..744)),
                 };
                 Met { member, place, toward: Vec3::X, share: 1.0 / 700.0, apart: false }
@@ -262,10 +261,10 @@ mod tests {
         let run = |link: &Link| unpack(link.packed).0;
         assert!((links.iter().map(share).sum::<f64>() - 600.0 / 700.0).abs() < 1e-3);
         let of = |wanted: usize| links.iter().filter(|link| run(link) == wanted).map(share).sum::<f64>();
-        assert!((of(286 + 1) - 60.0 / 700.0).abs() < 1e-3, "the smallest run");
-        let next = 250 + 4;
-        let within: f64 = (32..40).map(of).sum();
-        assert!((of(next) + within - 200.0 / 700.0).abs() < 0.01, "the run or its parts");
+        assert!((of(143 + 1) - 60.0 / 700.0).abs() < 1e-3, "the smallest run");
+        let cluster = 125 + 2;
+        let within: f64 = (16..24).map(of).sum();
+        assert!((of(cluster) + within - 200.0 / 700.0).abs() < 0.01, "the cluster or its runs");
         assert!(links.len() < 40, "{}", links.len());
     }
 
@@ -297,11 +296,11 @@ mod tests {
     /// Rays that meet one side of a run, which has another side in the dark, lead to that side alone.
     #[test]
     fn a_run_of_which_less_than_half_is_seen_stands_for_nothing() {
-        let mut runs = Runs::new([RUNS[2]]);
+        let mut runs = Runs::new([512]);
         let met = |runs: &Runs, places: u32| {
             links(
                 (0..places)
-                    .map(|i| Met { member: 0, place: 4 * i, toward: Vec3::X, share: 1e-3, apart: false })
+                    .map(|i| Met { member: 0, place: 8 * i, toward: Vec3::X, share: 1e-3, apart: false })
                     .collect(),
                 runs,
             )
@@ -309,7 +308,7 @@ mod tests {
         let largest = |links: Vec<Link>| links.iter().map(|link| unpack(link.packed).0).max();
         assert_eq!(largest(met(&runs, 3)), Some(2));
         assert_eq!(met(&runs, 3).len(), 3);
-        // Four of eight parts.
+        // Four of eight clusters.
         assert_eq!(largest(met(&runs, 32)), Some(64 + 8));
         // Of two sides, all or none.
         runs.mixed = vec![true; 64 + 8 + 1];

@@ -238,7 +238,7 @@ struct BouncePush {
     meets: u32,
 }
 
-/// A run of the largest size, at most 256 vertices, and the smaller ones that it consists of.
+/// A run of the largest size, at most 512 vertices, and the smaller ones that it consists of.
 #[repr(C)]
 #[derive(Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]
 struct RunBlock {
@@ -490,7 +490,7 @@ pub struct BounceWork<'w> {
 }
 
 pub fn runs_row(texels: bool, soft: bool) -> ShaderPermutation {
-    ShaderPermutation::new("runs.comp", 4).define("TEXEL", texels).define("LAMPS", soft).define("RUN", RUNS[0] as u32)
+    ShaderPermutation::new("runs.comp", 4).define("TEXEL", texels).define("LAMPS", soft)
 }
 
 pub fn bounce_row(texels: bool, soft: bool, movers: bool) -> ShaderPermutation {

@@ -1,7 +1,7 @@
 //! Silhouette fields: an object as parallel light sees it from every node of a grid, reduced to maps of distance and
 //! depth, on all cores.
 //!
-//! Each [`View`] holds the nearest and the farthest depth of what its pixels show. The outline is known at points between
+//! Each view holds the nearest and the farthest depth of what its pixels show. The outline is known at points between
 //! neighbouring pixels of which one is covered; these points lie in columns half a pixel apart, alternately between
 //! vertical and between horizontal neighbours. A map's distances are those to the nearest of them: the exact two-pass
 //! distance transform of Meijster, Roerdink and Hesselink, *A General Algorithm for Computing Distance Transforms in

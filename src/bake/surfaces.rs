@@ -601,7 +601,8 @@ impl GroupSpace<'_> {
 
     /// From each vertex towards the middle of its triangles, along the surface; and off the surface by
     /// [`TRANSFER_OFFSET`], as rays of references leave it, or half as far as what stands before it there, as a roof that
-    /// ends on a wall, where the vertex is one of several for the sides of what divides its plane. A flat mesh does not shade itself, and may be a ground that others touch.
+    /// ends on a wall, where the vertex is one of several for the sides of what divides its plane. A flat mesh does not
+    /// shade itself, and may be a ground that others touch.
     pub fn nudges(&self, positions: &[Vec3], normals: &[Vec3], triangles: &[[u32; 3]]) -> Vec<Vec3> {
         let mut sums = vec![(Vec3::ZERO, 0.0_f32); positions.len()];
         for triangle in triangles {

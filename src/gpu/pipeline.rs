@@ -298,8 +298,6 @@ fn color_blend(keeps: Keeps) -> vk::PipelineColorBlendAttachmentState {
         .dst_color_blend_factor(vk::BlendFactor::ONE_MINUS_SRC_ALPHA)
         .src_alpha_blend_factor(vk::BlendFactor::ONE)
         .dst_alpha_blend_factor(vk::BlendFactor::ONE_MINUS_SRC_ALPHA)
-        .color_blend_op(vk::BlendOp::ADD)
-        .alpha_blend_op(vk::BlendOp::ADD)
 }
 
 fn attribute_format(components: u32) -> vk::Format {

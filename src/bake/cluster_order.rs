@@ -4,31 +4,50 @@
 //! Each cut lies at a whole number of clusters, so a cluster is as compact as its neighbourhood lets it be. A
 //! space-filling curve would do worse: it leaps within some clusters, and a cluster that spans a leap has half of the
 //! scene on its list.
+//!
+//! Within a cluster the vertices of one side follow each other, in runs of [`RUN_VERTICES`] at most: the light that
+//! leaves a run is one number, and the outside of a window's frame may be a hundred times as bright as its inside.
 
 use super::triangles::unit_positions;
 use crate::asset::mesh::Mesh;
 use crate::asset::topology::Sets;
 use crate::layout::{CLUSTER_VERTICES, GROUP_CLUSTERS};
 use glam::Vec3;
+use rayon::prelude::*;
 
 /// The distance, in bounding radii, that the length of a normal counts as. It is a little more than the edge of a cube
 /// with that radius (1.15), so that the sides of a cube come apart first. Weights from 0.25 to 5 change the sum of all
 /// lists by 10 % at most.
 const NORMAL_WEIGHT: f32 = 1.25;
-/// Sizes of the runs that stay whole: groups whose lists are gathered together, clusters, and neighbours within a
-/// cluster, which share lines of the cache.
-const RUNS: [usize; 3] = [GROUP_CLUSTERS * CLUSTER_VERTICES as usize, CLUSTER_VERTICES as usize, 8];
+/// Most vertices of a run within a cluster.
+pub const RUN_VERTICES: usize = 8;
+/// Most runs of a cluster.
+pub const CLUSTER_RUNS: usize = 16;
+/// Sizes that stay whole: groups whose lists are gathered together, clusters, and neighbours within a cluster, which
+/// share lines of the cache.
+const WHOLE: [usize; 3] = [GROUP_CLUSTERS * CLUSTER_VERTICES as usize, CLUSTER_VERTICES as usize, RUN_VERTICES];
+/// Cosine between two normals from which vertices are of one side.
+const ONE_SIDE: f32 = 0.5;
 /// Below this number of vertices another thread costs more than it saves.
 const ALONE: usize = 1 << 14;
 
 /// A vertex: its place in bounding radii and its weighted normal, and its index.
 type Point = ([f32; 6], u32);
 
-/// The order of the mesh's vertices: which of them stands at each place.
-///
+/// Where the runs of a cluster end, in vertices from its first. Those that it lacks are empty.
+pub(crate) type RunEnds = [u8; CLUSTER_RUNS];
+
+/// The vertices of a mesh in the order of its clusters.
+pub(crate) struct ClusterOrder {
+    /// Which of them stands at each place.
+    pub vertices: Vec<u32>,
+    /// The runs of every cluster.
+    pub runs: Vec<RunEnds>,
+}
+
 /// Where vertices of a cluster share place and normal, as on a wall of which a roof divides the lit part from the dark
-/// one, those parts, which hang together by vertices, follow each other: neighbours have the light of one part.
-pub(crate) fn cluster_order(mesh: &Mesh) -> Vec<u32> {
+/// one, those parts, which hang together by vertices, are different sides too.
+pub(crate) fn cluster_order(mesh: &Mesh) -> ClusterOrder {
     let mut parts = Sets::new(mesh.positions.len());
     for [a, b, c] in &mesh.triangles {
         parts.join(*a as usize, *b as usize);
@@ -41,15 +60,41 @@ pub(crate) fn cluster_order(mesh: &Mesh) -> Vec<u32> {
     };
     let mut points: Vec<Point> = unit_positions(mesh).into_iter().enumerate().map(point).collect();
     halve(&mut points);
-    for cluster in points.chunks_mut(CLUSTER_VERTICES as usize) {
-        let divided = divided(cluster, &parts);
-        if divided.len() > 1 {
-            let part = |(_, v): &Point| divided.binary_search(&parts[*v as usize]).ok();
-            cluster.sort_by_key(part);
-            cluster.chunk_by_mut(|a, b| part(a) == part(b)).for_each(halve);
+    let runs = points.par_chunks_mut(CLUSTER_VERTICES as usize).map(|cluster| part(mesh, cluster, &parts)).collect();
+    ClusterOrder { vertices: points.into_iter().map(|(_, v)| v).collect(), runs }
+}
+
+/// Sorts the vertices of a cluster by their sides, and cuts those into runs.
+fn part(mesh: &Mesh, cluster: &mut [Point], parts: &[u32]) -> RunEnds {
+    let divided = divided(cluster, parts);
+    let mut sides: Vec<(Option<usize>, Vec3, Vec<Point>)> = Vec::new();
+    for point in &*cluster {
+        let v = point.1 as usize;
+        let of = divided.binary_search(&parts[v]).ok();
+        let normal = mesh.normals[v];
+        match sides.iter_mut().find(|(part, first, _)| *part == of && first.dot(normal) >= ONE_SIDE) {
+            Some((.., points)) => points.push(*point),
+            None => sides.push((of, normal, vec![*point])),
         }
     }
-    points.into_iter().map(|(_, v)| v).collect()
+    let mut sides: Vec<Vec<Point>> = sides.into_iter().map(|(.., points)| points).collect();
+    sides.sort_by_key(|points| std::cmp::Reverse(points.len()));
+    while sides.iter().map(|points| points.len().div_ceil(RUN_VERTICES)).sum::<usize>() > CLUSTER_RUNS {
+        let smallest = sides.pop().unwrap_or_default();
+        sides.last_mut().expect("a cluster fits its runs").extend(smallest);
+    }
+    let mut ends = [cluster.len() as u8; CLUSTER_RUNS];
+    let mut end = 0;
+    let mut run = ends.iter_mut();
+    for points in &mut sides {
+        halve(points);
+        cluster[end..end + points.len()].copy_from_slice(points);
+        for points in points.chunks(RUN_VERTICES) {
+            end += points.len();
+            *run.next().expect("runs are few enough above") = end as u8;
+        }
+    }
+    ends
 }
 
 /// The parts of vertices that share place and normal with one of another part, sorted.
@@ -65,7 +110,7 @@ fn divided(points: &[Point], parts: &[u32]) -> Vec<u32> {
 }
 
 fn halve(points: &mut [Point]) {
-    let Some(run) = RUNS.into_iter().find(|run| points.len() > *run) else { return };
+    let Some(run) = WHOLE.into_iter().find(|run| points.len() > *run) else { return };
     let mut low = [f32::INFINITY; 6];
     let mut high = [f32::NEG_INFINITY; 6];
     for (point, _) in points.iter() {
@@ -92,10 +137,19 @@ mod tests {
     use super::*;
     use crate::asset::generate;
 
-    /// A plane that is cut in two along a row of vertices, which each part has: no more runs have both parts than the one
-    /// in which a part ends, of every cluster.
+    /// The runs of a mesh, as places in the order of clusters.
+    fn runs(order: &ClusterOrder) -> Vec<&[u32]> {
+        let clusters = order.vertices.chunks(CLUSTER_VERTICES as usize).zip(&order.runs);
+        let of_cluster = |(vertices, ends): (&'_ [u32], &RunEnds)| {
+            let starts = std::iter::once(0).chain(*ends);
+            starts.zip(*ends).map(|(start, end)| &vertices[start as usize..end as usize]).collect::<Vec<_>>()
+        };
+        clusters.flat_map(of_cluster).filter(|run| !run.is_empty()).collect()
+    }
+
+    /// A plane that is cut in two along a row of vertices, which each part has: no run has both parts.
     #[test]
-    fn neighbours_are_of_one_side_of_a_cut() {
+    fn runs_are_of_one_side_of_a_cut() {
         let part = generate::plane(1.0, 20);
         let count = part.positions.len() as u32;
         let positions = [-0.5, 0.5].map(|x| part.positions.iter().map(move |p| *p + x * Vec3::X)).into_iter().flatten();
@@ -104,10 +158,29 @@ mod tests {
         let normals = vec![Vec3::Y; 2 * count as usize];
         let mesh = Mesh::new("cut", positions.collect(), normals, None, triangles.collect()).unwrap();
         let order = cluster_order(&mesh);
+        let is_cut = |run: &&[u32]| run.iter().any(|v| mesh.positions[*v as usize].x.abs() < 1e-6);
         let has_both = |run: &&[u32]| run.iter().any(|v| *v < count) && run.iter().any(|v| *v >= count);
-        let on_cut = |run: &[u32]| run.iter().any(|v| mesh.positions[*v as usize].x.abs() < 0.02);
-        for cluster in order.chunks(CLUSTER_VERTICES as usize).filter(|cluster| on_cut(cluster)) {
-            assert!(cluster.chunks(8).filter(has_both).count() <= 1, "{cluster:?}");
-        }
+        let cut: Vec<&[u32]> = runs(&order).into_iter().filter(is_cut).collect();
+        assert!(cut.len() > 5 && !cut.iter().any(has_both), "{cut:?}");
+    }
+
+    /// Many small boxes, of which each side has four vertices: no run has two sides, and each vertex is in one run.
+    #[test]
+    fn runs_are_of_one_side_of_a_bar() {
+        let bar = generate::cuboid(Vec3::new(0.02, 1.0, 0.02), 1);
+        let count = bar.positions.len() as u32;
+        let at = |i: u32| Vec3::new((i % 7) as f32, 0.0, (i / 7) as f32);
+        let positions = (0..40).flat_map(|i| bar.positions.iter().map(move |p| *p + at(i)));
+        let normals = (0..40).flat_map(|_| bar.normals.iter().copied()).collect();
+        let triangles = (0..40).flat_map(|i| bar.triangles.iter().map(move |t| t.map(|v| v + i * count)));
+        let mesh = Mesh::new("bars", positions.collect(), normals, None, triangles.collect()).unwrap();
+        let order = cluster_order(&mesh);
+        let runs = runs(&order);
+        let normal = |v: u32| mesh.normals[v as usize];
+        assert!(
+            runs.iter()
+                .all(|run| run.len() <= RUN_VERTICES && run.iter().all(|v| normal(*v).dot(normal(run[0])) > 0.5))
+        );
+        assert_eq!(runs.concat(), order.vertices);
     }
 }

@@ -2,22 +2,25 @@
 //! vertices.
 //!
 //! Nothing of a group moves against it, so what a vertex sees is decided when its own visibility is baked, by the same
-//! rays. Each ray that meets a front has a share of the cosine-weighted hemisphere, and goes to the run of
-//! [`RUNS`]`[0]` vertices around the place that it meets. Runs that are too small as seen from the vertex become parts
+//! rays. Each ray that meets a front has a share of the cosine-weighted hemisphere, and goes to the smallest run around
+//! the place that it meets. Runs that are too small as seen from the vertex become parts
 //! of larger ones, if those are seen too, and all that light from a far wall takes is one link (Hanrahan, Salzman,
 //! Aupperle, *A Rapid Hierarchical Radiosity Algorithm*, 1991). The sum of a vertex's links is the share of the
 //! hemisphere that shows fronts of the group.
 
+use super::cluster_order::{CLUSTER_RUNS, RUN_VERTICES, RunEnds};
+use crate::layout::CLUSTER_VERTICES;
 use crate::shaders::ShaderPermutation;
 use glam::Vec3;
 use std::ops::Range;
 
-/// Vertices of a run, in the order of clusters: the smallest runs, clusters, and groups of those.
-pub const RUNS: [usize; 3] = [8, 64, 512];
+/// Most vertices of a run, in the order of clusters: the smallest runs, which are of one side, clusters, and groups of
+/// those.
+pub const RUNS: [usize; 3] = [RUN_VERTICES, CLUSTER_VERTICES as usize, 512];
 /// A run with a smaller share of the hemisphere becomes part of a larger one.
 const LEAST_SHARE: f32 = 1.0 / 64.0;
-/// Most links of a vertex. Where there are more, the largest take over the shares of the others.
-const MOST_LINKS: usize = 128;
+/// Most links of a vertex. Where there are more, some take over the shares of their neighbours.
+const MOST_LINKS: usize = 192;
 /// Bits of the number of a run, below those of its share.
 pub const RUN_BITS: u32 = 20;
 /// The upper half of the smallest share that is kept, 2^-31, as f32.
@@ -56,63 +59,116 @@ pub fn macros(row: ShaderPermutation) -> ShaderPermutation {
 /// Numbers of the runs of a group's members.
 #[derive(Clone, Debug)]
 pub struct Runs {
-    /// For each member the number of the first run of each size.
-    firsts: Vec<[u32; RUNS.len()]>,
-    vertex_counts: Vec<usize>,
+    members: Vec<MemberRuns>,
     count: u32,
     /// Of every run, whether it has vertices of different sides, as of both faces of a wall; empty where links are known.
     pub mixed: Vec<bool>,
 }
 
-impl Runs {
-    /// For members with so many vertices.
-    pub fn new(vertex_counts: impl IntoIterator<Item = usize>) -> Self {
-        let mut runs = Runs { firsts: Vec::new(), vertex_counts: Vec::new(), count: 0, mixed: Vec::new() };
-        for vertices in vertex_counts {
-            runs.firsts.push(RUNS.map(|size| {
-                let first = runs.count;
-                runs.count += vertices.div_ceil(size) as u32;
-                first
-            }));
-            runs.vertex_counts.push(vertices);
+#[derive(Clone, Debug)]
+struct MemberRuns {
+    /// The number of the first run of each size.
+    firsts: [u32; RUNS.len()],
+    /// The number of the first smallest run of every cluster, and that after the last.
+    smallest: Vec<u32>,
+    /// Where those end.
+    ends: Vec<RunEnds>,
+    vertices: usize,
+}
+
+impl MemberRuns {
+    /// First vertices of the runs of a size, and how many they have.
+    fn spans(&self, size: usize) -> Vec<(usize, usize)> {
+        if size > 0 {
+            let firsts = (0..self.vertices).step_by(RUNS[size]);
+            return firsts.map(|first| (first, RUNS[size].min(self.vertices - first))).collect();
         }
-        runs
+        let of_cluster = |(cluster, ends): (usize, &RunEnds)| {
+            let mut start = 0;
+            ends.map(|end| {
+                let span = (RUNS[1] * cluster + start, usize::from(end) - start);
+                start = end.into();
+                span
+            })
+        };
+        self.ends.iter().enumerate().flat_map(of_cluster).filter(|(_, count)| *count > 0).collect()
+    }
+}
+
+impl Runs {
+    /// For members of which the clusters have such runs.
+    pub fn new<'r>(members: impl IntoIterator<Item = &'r [RunEnds]>) -> Self {
+        let mut count = 0;
+        let mut next = |runs: usize| {
+            let first = count;
+            count += runs as u32;
+            first
+        };
+        let member = |ends: &[RunEnds]| {
+            let of_cluster = |ends: &RunEnds| {
+                let last = ends[CLUSTER_RUNS - 1];
+                ends.iter().position(|end| *end == last).map_or(0, |last| last + 1)
+            };
+            let mut smallest: Vec<u32> = ends.iter().map(|ends| next(of_cluster(ends))).collect();
+            let middle = next(ends.len());
+            smallest.push(middle);
+            let last = ends.last().map_or(0, |ends| usize::from(ends[CLUSTER_RUNS - 1]));
+            let vertices = ends.len().saturating_sub(1) * RUNS[1] + last;
+            let firsts = [smallest[0], middle, next(vertices.div_ceil(RUNS[2]))];
+            MemberRuns { firsts, smallest, ends: ends.to_vec(), vertices }
+        };
+        let members = members.into_iter().map(member).collect();
+        Runs { members, count, mixed: Vec::new() }
     }
 
     pub fn count(&self) -> u32 {
         self.count
     }
 
+    /// The number of the run of a size around a place in the order of a member.
+    pub fn at(&self, size: usize, member: usize, place: usize) -> u32 {
+        let MemberRuns { firsts, smallest, ends, .. } = &self.members[member];
+        if size > 0 {
+            return firsts[size] + (place / RUNS[size]) as u32;
+        }
+        let cluster = place / RUNS[1];
+        let within = (place % RUNS[1]) as u8;
+        smallest[cluster] + ends[cluster].partition_point(|end| *end <= within) as u32
+    }
+
     /// The number of the run of a size that was met.
-    fn of(&self, size: usize, met: &[Met]) -> u32 {
-        self.firsts[met[0].member as usize][size] + met[0].place / RUNS[size] as u32
+    fn of(&self, size: usize, met: &Met) -> u32 {
+        self.at(size, met.member as usize, met.place as usize)
     }
 
     /// Numbers of the runs of one size, `RUNS[size]`, and what [`Runs::all`] has of each.
     pub fn of_size(&self, size: usize) -> impl Iterator<Item = (u32, (usize, usize, usize))> {
-        let members = self.firsts.iter().zip(&self.vertex_counts).enumerate();
-        members.flat_map(move |(member, (firsts, &vertices))| {
-            let runs = (0..vertices).step_by(RUNS[size]);
-            (firsts[size]..).zip(runs.map(move |first| (member, first, RUNS[size].min(vertices - first))))
+        self.members.iter().enumerate().flat_map(move |(member, runs)| {
+            (runs.firsts[size]..).zip(runs.spans(size)).map(move |(run, (first, count))| (run, (member, first, count)))
         })
     }
 
     /// Numbers of the next smaller runs that a run consists of.
     pub fn parts(&self, number: u32) -> Range<u32> {
-        let member = self.firsts.partition_point(|firsts| firsts[0] <= number) - 1;
-        let firsts = self.firsts[member];
-        let Some(size) = (1..RUNS.len()).rfind(|&size| firsts[size] <= number) else { return 0..0 };
-        let ratio = (RUNS[size] / RUNS[size - 1]) as u32;
-        let first = firsts[size - 1] + (number - firsts[size]) * ratio;
-        first..(first + ratio).min(firsts[size])
+        let member = self.members.partition_point(|member| member.firsts[0] <= number) - 1;
+        let MemberRuns { firsts, smallest, .. } = &self.members[member];
+        if number < firsts[1] {
+            return 0..0;
+        }
+        if number < firsts[2] {
+            let cluster = (number - firsts[1]) as usize;
+            return smallest[cluster]..smallest[cluster + 1];
+        }
+        let ratio = (RUNS[2] / RUNS[1]) as u32;
+        let first = firsts[1] + (number - firsts[2]) * ratio;
+        first..(first + ratio).min(firsts[2])
     }
 
     /// Member, first vertex in the order of clusters, and number of vertices of every run.
     pub fn all(&self) -> impl Iterator<Item = (usize, usize, usize)> {
-        self.vertex_counts.iter().enumerate().flat_map(|(member, &vertices)| {
-            RUNS.into_iter().flat_map(move |size| {
-                (0..vertices).step_by(size).map(move |first| (member, first, size.min(vertices - first)))
-            })
+        self.members.iter().enumerate().flat_map(|(member, runs)| {
+            let spans = (0..RUNS.len()).flat_map(|size| runs.spans(size));
+            spans.map(move |(first, count)| (member, first, count))
         })
     }
 }
@@ -123,6 +179,8 @@ pub struct Met {
     pub member: u32,
     /// The vertex that is nearest to the place, by its place in the order of clusters.
     pub place: u32,
+    /// Which way that faces, see [`side`].
+    pub side: u8,
     /// Direction of the ray.
     pub toward: Vec3,
     /// Share of the cosine-weighted hemisphere.
@@ -131,9 +189,17 @@ pub struct Met {
     pub apart: bool,
 }
 
+/// Which of six ways a normal points most.
+pub fn side(normal: Vec3) -> u8 {
+    let axis = normal.abs().max_position();
+    2 * axis as u8 + u8::from(normal[axis] < 0.0)
+}
+
 /// Rays that go to one run.
 #[derive(Clone, Copy, Default)]
 struct Bundle {
+    /// Member and side of one of them.
+    of: (u32, u8),
     share: f32,
     /// Sum of their directions by their shares.
     toward: Vec3,
@@ -141,7 +207,7 @@ struct Bundle {
 
 impl Bundle {
     fn of(bundles: impl IntoIterator<Item = Bundle>) -> Self {
-        let add = |a: Bundle, b: Bundle| Bundle { share: a.share + b.share, toward: a.toward + b.toward };
+        let add = |a: Bundle, b: Bundle| Bundle { of: b.of, share: a.share + b.share, toward: a.toward + b.toward };
         bundles.into_iter().fold(Bundle::default(), add)
     }
 }
@@ -164,7 +230,7 @@ pub fn links(mut met: Vec<Met>, runs: &Runs) -> Vec<Link> {
     let first = links.len();
     link(RUNS.len() - 1, others, runs, &mut links);
     if links.len() > MOST_LINKS {
-        keep_largest(&mut links, if first < MOST_LINKS { first } else { 0 });
+        thin(&mut links, if first < MOST_LINKS / 2 { first } else { 0 });
     }
     let link = |(number, bundle): (u32, Bundle)| {
         Some(Link { packed: pack(bundle.share, number)?, direction: pack_direction(bundle.toward) })
@@ -174,24 +240,44 @@ pub fn links(mut met: Vec<Met>, runs: &Runs) -> Vec<Link> {
 
 /// Links runs of at most this size.
 fn link(largest: usize, met: &[Met], runs: &Runs, links: &mut Vec<(u32, Bundle)>) {
-    for of_largest in met.chunk_by(|a, b| is_one(largest, a, b)) {
+    for of_largest in met.chunk_by(|a, b| runs.of(largest, a) == runs.of(largest, b)) {
         let rest = join(largest, of_largest, runs, links);
-        links.extend(rest.filter(|rest| rest.share > 0.0).map(|rest| (runs.of(largest, of_largest), rest)));
+        links.extend(rest.filter(|rest| rest.share > 0.0).map(|rest| (runs.of(largest, &of_largest[0]), rest)));
     }
 }
 
-/// Leaves [`MOST_LINKS`]; the largest of those from `first` on take over the shares of the others.
-fn keep_largest(links: &mut Vec<(u32, Bundle)>, first: usize) {
-    let share = |links: &[(u32, Bundle)]| links.iter().map(|(_, bundle)| bundle.share).sum::<f32>();
-    let all = share(&links[first..]);
-    links[first..].select_nth_unstable_by(MOST_LINKS - first, |a, b| b.1.share.total_cmp(&a.1.share));
-    links.truncate(MOST_LINKS);
-    let kept = share(&links[first..]);
-    links[first..].iter_mut().for_each(|(_, bundle)| bundle.share *= all / kept);
-}
-
-fn is_one(size: usize, a: &Met, b: &Met) -> bool {
-    a.member == b.member && a.place as usize / RUNS[size] == b.place as usize / RUNS[size]
+/// Leaves [`MOST_LINKS`]. Those from `first` on are thinned: of links that follow each other and lead to one side of a
+/// member the largest takes over the shares of the others, until it has its part of all. Were the smallest left out
+/// wherever they lead, a wall would lose the light of a window's sunny sill and frame, which are many small runs: a
+/// third of its light.
+fn thin(links: &mut Vec<(u32, Bundle)>, first: usize) {
+    let mut many = links.split_off(first);
+    let room = MOST_LINKS - first;
+    let all = Bundle::of(many.iter().map(|(_, bundle)| *bundle)).share;
+    many.sort_by_key(|(_, bundle)| bundle.of);
+    let sides = many.chunk_by(|a, b| a.1.of == b.1.of).count();
+    let is_split = sides <= room / 2;
+    let least = all / (room - if is_split { sides } else { 0 }) as f32;
+    for of_side in many.chunk_by(|a, b| !is_split || a.1.of == b.1.of) {
+        let before = links.len();
+        let mut rest: Vec<(u32, Bundle)> = Vec::new();
+        let join = |of: &[(u32, Bundle)]| {
+            let (number, _) = of.iter().max_by(|a, b| a.1.share.total_cmp(&b.1.share))?;
+            Some((*number, Bundle::of(of.iter().map(|(_, bundle)| *bundle))))
+        };
+        for link in of_side {
+            rest.push(*link);
+            if rest.iter().map(|(_, bundle)| bundle.share).sum::<f32>() >= least {
+                links.extend(join(&rest));
+                rest.clear();
+            }
+        }
+        // What is left over is less than a link.
+        match links[before..].last_mut() {
+            Some((_, last)) => *last = Bundle::of(rest.iter().map(|(_, bundle)| *bundle).chain([*last])),
+            None => links.extend(join(&rest)),
+        }
+    }
 }
 
 /// Links the parts of a run that was met, so far as it may not stand for them; then the rays of all others. A run of
@@ -199,21 +285,25 @@ fn is_one(size: usize, a: &Met, b: &Met) -> bool {
 /// did not meet all: the others may be the far side of a wall, and all that is lit there would shine through it.
 fn join(size: usize, met: &[Met], runs: &Runs, links: &mut Vec<(u32, Bundle)>) -> Option<Bundle> {
     if size == 0 {
-        return Some(Bundle::of(met.iter().map(|met| Bundle { share: met.share, toward: met.share * met.toward })));
+        let bundle = |met: &Met| {
+            let Met { member, side, share, toward, .. } = *met;
+            Bundle { of: (member, side), share, toward: share * toward }
+        };
+        return Some(Bundle::of(met.iter().map(bundle)));
     }
     let mut small = Vec::new();
     let mut met_parts = 0;
     let mut is_whole = true;
-    for part in met.chunk_by(|a, b| is_one(size - 1, a, b)) {
+    for part in met.chunk_by(|a, b| runs.of(size - 1, a) == runs.of(size - 1, b)) {
         met_parts += 1;
-        let number = runs.of(size - 1, part);
+        let number = runs.of(size - 1, &part[0]);
         match join(size - 1, part, runs, links) {
             Some(bundle) if bundle.share >= LEAST_SHARE => links.push((number, bundle)),
             Some(bundle) => small.push((number, bundle)),
             None => is_whole = false,
         }
     }
-    let number = runs.of(size, met);
+    let number = runs.of(size, &met[0]);
     let parts = runs.parts(number).len();
     let is_mixed = runs.mixed.get(number as usize) == Some(&true);
     if is_whole && met_parts >= if is_mixed { parts } else { parts.div_ceil(2) } {
@@ -227,9 +317,20 @@ fn join(size: usize, met: &[Met], runs: &Runs, links: &mut Vec<(u32, Bundle)>) -
 mod tests {
     use super::*;
 
+    /// Runs of vertices that are all of one side.
+    fn plain(vertices: &[usize]) -> Runs {
+        let of_cluster = |left: usize| std::array::from_fn(|run| (8 * run + 8).min(left) as u8);
+        let ends = |&vertices: &usize| {
+            let clusters = (0..vertices).step_by(64);
+            clusters.map(|first| of_cluster((vertices - first).min(64))).collect::<Vec<RunEnds>>()
+        };
+        let ends: Vec<_> = vertices.iter().map(ends).collect();
+        Runs::new(ends.iter().map(|ends| &ends[..]))
+    }
+
     #[test]
     fn links_keep_the_share_of_all_rays_and_split_where_it_is_large() {
-        let runs = Runs::new([1000, 70]);
+        let runs = plain(&[1000, 70]);
         assert_eq!(runs.count(), 125 + 16 + 2 + 9 + 2 + 1);
         assert_eq!(runs.all().count() as u32, runs.count());
         assert_eq!(runs.all().last(), Some((1, 0, 70)));
@@ -253,7 +354,7 @@ mod tests {
                     3..13 => (0, 128 + rng.u32(0..64)),
                     _ => (0, 256 + rng.u32(0..744)),
                 };
-                Met { member, place, toward: Vec3::X, share: 1.0 / 700.0, apart: false }
+                Met { member, place, side: 0, toward: Vec3::X, share: 1.0 / 700.0, apart: false }
             })
             .collect();
         let links = links(met, &runs);
@@ -280,9 +381,11 @@ mod tests {
     /// Where there are too many links, those of what is bright stay as they are.
     #[test]
     fn bright_fronts_are_linked_however_small_they_are() {
-        let runs = Runs::new([16_000, 80]);
-        let dim = (0..250).map(|i| Met { member: 0, place: 64 * i, toward: Vec3::X, share: 1e-3, apart: false });
-        let bright = (0..10).map(|i| Met { member: 1, place: 8 * i, toward: Vec3::X, share: 1e-6, apart: true });
+        let runs = plain(&[16_000, 80]);
+        let dim =
+            (0..250).map(|i| Met { member: 0, place: 64 * i, side: 0, toward: Vec3::X, share: 1e-3, apart: false });
+        let bright =
+            (0..10).map(|i| Met { member: 1, place: 8 * i, side: 0, toward: Vec3::X, share: 1e-6, apart: true });
         let links = links(dim.chain(bright).collect(), &runs);
         let first_bright = runs.of_size(0).find(|(_, (member, ..))| *member == 1).unwrap().0 as usize;
         let shares = |wanted: bool| {
@@ -296,11 +399,11 @@ mod tests {
     /// Rays that meet one side of a run, which has another side in the dark, lead to that side alone.
     #[test]
     fn a_run_of_which_less_than_half_is_seen_stands_for_nothing() {
-        let mut runs = Runs::new([512]);
+        let mut runs = plain(&[512]);
         let met = |runs: &Runs, places: u32| {
             links(
                 (0..places)
-                    .map(|i| Met { member: 0, place: 8 * i, toward: Vec3::X, share: 1e-3, apart: false })
+                    .map(|i| Met { member: 0, place: 8 * i, side: 0, toward: Vec3::X, share: 1e-3, apart: false })
                     .collect(),
                 runs,
             )

@@ -1,8 +1,8 @@
 //! Surfaces: the meshes of a rigid group as they are lit and drawn, with the own visibility of every vertex past the
 //! whole group.
 
-use super::cluster_order::cluster_order;
-use super::links::{Link, Met, RUNS, Runs, links};
+use super::cluster_order::{ClusterOrder, cluster_order};
+use super::links::{Link, Met, Runs, links, side};
 use super::own_visibility::{Counts, Eye, Front, PATTERN, Rays, Seen, Standing, Target, directions, see};
 use super::packet::{BlockerHit, BlockerTriangle, Blockers, Mask};
 use super::refine::{FLAT, Limits, ON_TRIANGLE, Refined, refine};
@@ -30,7 +30,7 @@ use std::sync::{Arc, OnceLock};
 use std::time::Instant;
 
 /// Counts in every name of the cache: another number where a bake of surfaces computes something else.
-const VERSION: u32 = 50;
+const VERSION: u32 = 55;
 /// How far towards the middle of its triangles a vertex is seen from, as a share of the way: the light of a crease is
 /// that just inside each face. Where meshes are left as they are, so are the places from which they are seen.
 const NUDGE: f32 = 0.02;
@@ -440,9 +440,9 @@ impl GroupPlan {
                 Lit::new(&self.members[member].mesh, surface, parents[member].as_deref(), &is_mixed)
             })
             .collect();
-        let mut runs = Runs::new(lit.iter().map(|lit| lit.order.len()));
+        let mut runs = Runs::new(lit.iter().map(|lit| &lit.order.runs[..]));
         let is_mixed = |(member, first, count): (usize, usize, usize)| {
-            is_mixed_run(member, &lit[member].order[first..first + count])
+            is_mixed_run(member, &lit[member].order.vertices[first..first + count])
         };
         let all: Vec<(usize, usize, usize)> = runs.all().collect();
         runs.mixed = all.into_par_iter().map(is_mixed).collect();
@@ -835,7 +835,7 @@ impl GroupSpace<'_> {
         told: &dyn Fn(usize),
     ) -> BakedSurface {
         let plan = self.group.plan;
-        let order = &lit[self.member].order;
+        let order = &lit[self.member].order.vertices;
         // Few meshes have buried vertices, which alone ask for their triangles.
         let around = OnceLock::new();
         let stride = channel_stride(plan.bands);
@@ -900,12 +900,11 @@ impl GroupSpace<'_> {
                 let linked = |v: &u32| {
                     let mut seen = vertex(v);
                     let fronts = std::mem::take(&mut seen.fronts).into_iter();
-                    let met = fronts.map(|Front { member, triangle, weights, toward, apart, share, .. }| Met {
-                        member,
-                        place: lit[member as usize].place(triangle, weights),
-                        toward: toward.into(),
-                        share,
-                        apart,
+                    let met = fronts.map(|Front { member, triangle, weights, toward, apart, share, .. }| {
+                        let lit = &lit[member as usize];
+                        let place = lit.place(triangle, weights);
+                        let side = lit.sides[place as usize];
+                        Met { member, place, side, toward: toward.into(), share, apart }
                     });
                     (seen, links(met.collect(), runs))
                 };
@@ -960,7 +959,9 @@ fn is_mixed(mesh: &Mesh, vertices: &[u32]) -> bool {
 
 /// The vertices that are lit on the triangles of a mesh.
 struct Lit {
-    order: Vec<u32>,
+    order: ClusterOrder,
+    /// Which way the vertex at each place faces.
+    sides: Vec<u8>,
     /// For each triangle of the mesh: the first of its cells, and how many lie along a side of its square.
     grids: Vec<(u32, u32)>,
     /// The place in the order of the vertex that lies nearest to the middle of each cell.
@@ -972,9 +973,12 @@ impl Lit {
     /// vertices are of different sides.
     fn new(mesh: &Mesh, surface: &Mesh, parents: Option<&[u32]>, is_mixed: &dyn Fn(&[u32]) -> bool) -> Self {
         let order = cluster_order(surface);
-        let mut places = vec![0; order.len()];
-        order.iter().zip(0..).for_each(|(&v, place)| places[v as usize] = place);
-        let mixed: Vec<bool> = order.chunks(RUNS[0]).map(is_mixed).collect();
+        let mut places = vec![0; order.vertices.len()];
+        order.vertices.iter().zip(0..).for_each(|(&v, place)| places[v as usize] = place);
+        let mut mixed = vec![false; places.len()];
+        for (_, (_, first, count)) in Runs::new([&order.runs[..]]).of_size(0) {
+            mixed[first..first + count].fill(is_mixed(&order.vertices[first..first + count]));
+        }
         let mut counts = vec![0_u32; mesh.triangles.len()];
         let parent = |part: usize| parents.map_or(part, |parents| parents[part] as usize);
         (0..surface.triangles.len()).for_each(|part| counts[parent(part)] += 1);
@@ -1011,7 +1015,7 @@ impl Lit {
                         let place = at[0] * edges[0] + at[1] * edges[1];
                         let away = positions.map(|position| position.distance_squared(place));
                         // The light of a run is the mean of its vertices.
-                        let is_mixed = |i: usize| mixed[places[vertices[i] as usize] as usize / RUNS[0]];
+                        let is_mixed = |i: usize| mixed[places[vertices[i] as usize] as usize];
                         let nearest =
                             (0..3).min_by(|&a, &b| is_mixed(a).cmp(&is_mixed(b)).then(away[a].total_cmp(&away[b])));
                         *cell = places[vertices[nearest.unwrap_or(0)] as usize];
@@ -1029,7 +1033,8 @@ impl Lit {
                 }
             }
         }
-        Lit { order, grids, cells }
+        let sides = order.vertices.iter().map(|&v| side(surface.normals[v as usize])).collect();
+        Lit { order, sides, grids, cells }
     }
 
     /// The place in the order of the vertex nearest to a place of a triangle.

@@ -15,6 +15,7 @@ mod relaxation;
 pub(crate) mod twin;
 
 use crate::asset::Mesh;
+use crate::bake::cluster_order::RunEnds;
 use crate::bake::links::{self, RUN_BITS, RUNS, Runs};
 use crate::bake::surfaces::Links;
 use crate::error::Result;
@@ -29,6 +30,7 @@ use crate::merge::variant::MergePermutation;
 use crate::scene::Placement;
 use crate::shaders::{Library, ShaderPermutation};
 use ash::vk;
+use bytemuck::Zeroable;
 use glam::{DVec3, Vec3};
 use movers::{Movers, Surfaces};
 use relaxation::Relaxation;
@@ -104,15 +106,23 @@ impl Linked {
         };
         for members in rigid {
             let base = linked.run_count as u32;
-            let runs = Runs::new(members.iter().map(|&member| entities[member].order.len()));
+            let runs = Runs::new(members.iter().map(|&member| entities[member].runs));
             linked.run_count += runs.count() as usize;
             let block = |(number, (member, first, count)): (u32, (usize, usize, usize))| {
-                let middle = runs.parts(number).start;
-                RunBlock {
+                let clusters = runs.parts(number);
+                let mut block = RunBlock {
                     vertex_first: (entities[members[member]].first + first) as u32,
                     vertex_count: count as u32,
-                    runs: [runs.parts(middle).start, middle, number].map(|run| base + run),
+                    middle: base + clusters.start,
+                    large: base + number,
+                    ..RunBlock::zeroed()
+                };
+                let ends = entities[members[member]].runs[first / RUNS[1]..].iter();
+                for (index, (cluster, ends)) in clusters.zip(ends).enumerate() {
+                    block.smallest[index] = base + runs.parts(cluster).start;
+                    block.ends[index] = *ends;
                 }
+                block
             };
             linked.blocks.extend(runs.of_size(RUNS.len() - 1).map(block));
             for &member in members {
@@ -229,7 +239,7 @@ impl Steps {
 
 /// What pass "bounce" is pushed.
 #[repr(C)]
-#[derive(Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]
+#[derive(Clone, Copy, bytemuck::Pod, Zeroable)]
 struct BouncePush {
     gain: [f32; 3],
     count: u32,
@@ -238,14 +248,21 @@ struct BouncePush {
     meets: u32,
 }
 
-/// A run of the largest size, at most 512 vertices, and the smaller ones that it consists of.
+/// Clusters of a run of the largest size.
+const BLOCK_CLUSTERS: usize = RUNS[2] / RUNS[1];
+
+/// A run of the largest size and the smaller ones that it consists of.
 #[repr(C)]
-#[derive(Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]
+#[derive(Clone, Copy, bytemuck::Pod, Zeroable)]
 struct RunBlock {
     vertex_first: u32,
     vertex_count: u32,
-    /// Its first run of each size of [`RUNS`].
-    runs: [u32; RUNS.len()],
+    /// Its first cluster and itself, as runs.
+    middle: u32,
+    large: u32,
+    /// The first smallest run of each cluster, and where those end in it.
+    smallest: [u32; BLOCK_CLUSTERS],
+    ends: [RunEnds; BLOCK_CLUSTERS],
 }
 
 /// An entity whose vertices may have links.
@@ -253,6 +270,8 @@ pub struct LinkedEntity<'e> {
     pub mesh: &'e Mesh,
     /// Which vertex of the mesh stands at each place of the buffers of light.
     pub order: &'e [u32],
+    /// The runs of each of its clusters.
+    pub runs: &'e [RunEnds],
     /// The first of these places.
     pub first: usize,
     /// Its mesh's bounding sphere, metres.

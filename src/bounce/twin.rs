@@ -133,15 +133,19 @@ impl HostLinks {
     /// Mean light of every run.
     pub fn means(&self, light: &[DVec3]) -> Vec<DVec3> {
         let of_block = |block: &RunBlock| {
-            let mut means = Vec::new();
             let places = block.vertex_first as usize..(block.vertex_first + block.vertex_count) as usize;
-            for (first, size) in block.runs.into_iter().zip(RUNS) {
-                for (run, start) in (first as usize..).zip(places.clone().step_by(size)) {
-                    let places = start..(start + size).min(places.end);
-                    let whole: f64 = places.clone().map(|v| f64::from(self.areas[v])).sum();
-                    let mean = places.map(|v| light[v] * (f64::from(self.areas[v]) / whole.max(1e-30))).sum();
-                    means.push((run, mean));
-                }
+            let mean = |places: Range<usize>| -> DVec3 {
+                let whole: f64 = places.clone().map(|v| f64::from(self.areas[v])).sum();
+                places.map(|v| light[v] * (f64::from(self.areas[v]) / whole.max(1e-30))).sum()
+            };
+            let mut means = vec![(block.large as usize, mean(places.clone()))];
+            for (cluster, start) in places.clone().step_by(RUNS[1]).enumerate() {
+                means.push((block.middle as usize + cluster, mean(start..places.end.min(start + RUNS[1]))));
+                let ends = block.ends[cluster].map(|end| start + usize::from(end));
+                let starts = std::iter::once(start).chain(ends);
+                let smallest = starts.zip(ends).filter(|(start, end)| start < end);
+                let numbered = (block.smallest[cluster] as usize..).zip(smallest);
+                means.extend(numbered.map(|(run, (start, end))| (run, mean(start..end))));
             }
             means
         };

@@ -143,6 +143,7 @@ impl Frame {
         let linked = |(entity, links)| LinkedEntity {
             mesh: scene.surface(entity),
             order: &buffers.surface(entity).order,
+            runs: &buffers.surface(entity).runs,
             first: radiosity.offsets[entity] as usize / 16,
             centre_m: buffers.meshes[scene.entities[entity].mesh].centre_m,
             radius_m: buffers.meshes[scene.entities[entity].mesh].radius_m,

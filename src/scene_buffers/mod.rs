@@ -7,7 +7,7 @@ pub mod limits;
 pub mod silhouettes;
 mod textures;
 
-use crate::bake::cluster_order::cluster_order;
+use crate::bake::cluster_order::{ClusterOrder, RunEnds, cluster_order};
 use crate::bake::ensure::Baked;
 use crate::bake::{self, BakedScene, BakedSurface};
 use crate::draw::DrawnMesh;
@@ -56,6 +56,8 @@ pub struct DeviceSurface {
     pub vertices: Range<u32>,
     /// Which vertex of the mesh stands at each place of that range. Neighbours stand together.
     pub order: Vec<u32>,
+    /// The runs of every cluster.
+    pub(crate) runs: Vec<RunEnds>,
     /// Bounds of every cluster of [`crate::layout::CLUSTER_VERTICES`] vertices.
     pub clusters: Vec<ClusterBounds>,
     /// The faces around each cluster, which decide whether a camera sees it.
@@ -118,7 +120,7 @@ impl Packing {
         let mesh = &baked.mesh;
         let (centre, _) = mesh.bounding_sphere();
         let vertex_first = vertices.len() as u32;
-        let order = cluster_order(mesh);
+        let ClusterOrder { vertices: order, runs } = cluster_order(mesh);
         let drawn = DrawnMesh::new(device, mesh, &order, *drawn, by_triangles)?;
         let steps = drawn.grid().map_or_else(|| mesh.steps(), |grid| vec![grid.step_m; order.len()]);
         let longest = || steps.iter().copied().fold(0.0, f32::max);
@@ -153,6 +155,7 @@ impl Packing {
             drawn,
             reach_m,
             order,
+            runs,
         })
     }
 }

@@ -137,14 +137,17 @@ mod tests {
     use super::*;
     use crate::asset::generate;
 
-    /// The runs of a mesh, as places in the order of clusters.
+    /// The vertices of every run.
     fn runs(order: &ClusterOrder) -> Vec<&[u32]> {
-        let clusters = order.vertices.chunks(CLUSTER_VERTICES as usize).zip(&order.runs);
-        let of_cluster = |(vertices, ends): (&'_ [u32], &RunEnds)| {
-            let starts = std::iter::once(0).chain(*ends);
-            starts.zip(*ends).map(|(start, end)| &vertices[start as usize..end as usize]).collect::<Vec<_>>()
-        };
-        clusters.flat_map(of_cluster).filter(|run| !run.is_empty()).collect()
+        let mut runs = Vec::new();
+        for (vertices, ends) in order.vertices.chunks(CLUSTER_VERTICES as usize).zip(&order.runs) {
+            let mut start = 0;
+            for end in ends.map(usize::from) {
+                runs.extend((end > start).then_some(&vertices[start..end]));
+                start = end;
+            }
+        }
+        runs
     }
 
     /// A plane that is cut in two along a row of vertices, which each part has: no run has both parts.

@@ -7,7 +7,7 @@ use super::{Frame, gloss};
 use crate::asset::edges::within_picture;
 use crate::asset::mesh::Mesh;
 use crate::bounce::Bounces;
-use crate::draw::mirror::{Mirrored, PROBE_ZOOM, REACH, finest_side};
+use crate::draw::mirror::{FLAT, Mirrored, PROBE_ZOOM, REACH, finest_side};
 use crate::draw::triangles::Detail;
 use crate::draw::{DrawnViewport, EVERYWHERE, PictureLights};
 use crate::gloss::{PIXEL_ROUGHNESS, brdf};
@@ -137,6 +137,7 @@ pub(super) fn reflectors(scene: &Scene) -> Reflectors {
 }
 
 /// Rectangles around the largest flat faces of a mesh, and their normals; and the share of its surface that is in them.
+/// Triangles that are shaded as if they were round, as those of a door with a bevel are, mirror as what is curved does.
 fn flat_faces(mesh: &Mesh) -> (Vec<([DVec3; 4], DVec3)>, f64) {
     let (centre, radius_m) = mesh.bounding_sphere();
     let mut planes: HashMap<[i32; 4], (f64, DVec3, Vec<DVec3>)> = HashMap::new();
@@ -144,6 +145,10 @@ fn flat_faces(mesh: &Mesh) -> (Vec<([DVec3; 4], DVec3)>, f64) {
         let [a, b, c] = triangle.map(|v| mesh.positions[v as usize].as_dvec3());
         let twice = (b - a).cross(c - a);
         let Some(normal) = twice.try_normalize() else { continue };
+        let is_shaded_flat = |v: &u32| normal.dot(mesh.normals[*v as usize].as_dvec3()) > FLAT;
+        if !triangle.iter().all(is_shaded_flat) {
+            continue;
+        }
         let offset = normal.dot(a - centre.as_dvec3()) / f64::from(radius_m);
         let key = (normal.extend(offset) * 1024.0).round().as_ivec4().to_array();
         let (area_m2, _, corners) = planes.entry(key).or_insert((0.0, normal, Vec::new()));
@@ -575,6 +580,10 @@ mod tests {
             assert!((area - wanted).abs() < 1e-5, "{normal}: {area}");
         }
         assert_eq!(flat_faces(&sphere(1.0, 3)), (Vec::new(), 0.0));
+        let Mesh { name, positions, normals, triangles, .. } = cuboid(Vec3::ONE, 1);
+        let round = normals.iter().zip(&positions).map(|(normal, position)| (*normal + 0.2 * *position).normalize());
+        let bevelled = Mesh::new(name, positions.clone(), round.collect(), None, triangles).unwrap();
+        assert_eq!(flat_faces(&bevelled), (Vec::new(), 0.0));
     }
 
     #[test]

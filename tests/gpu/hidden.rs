@@ -51,7 +51,7 @@ fn pictures_are_the_same_to_the_bit() {
         let mut frames = [gpu.frame(&scene, options), gpu.frame(&scene, without)];
         let mut placements = scene.at(0.0);
         let mut rng = fastrand::Rng::with_seed(5);
-        for round in 0..24 {
+        for round in 0..12 {
             // At times all things move, mostly one or two, and now and then none.
             let movers: Vec<usize> = match round % 8 {
                 0 => (1..placements.len()).collect(),

@@ -34,7 +34,7 @@ fn picture_error(gpu: &Gpu, scene: &Scene) -> f64 {
 
 fn error_with(gpu: &Gpu, scene: &Scene, bounces: Bounces) -> f64 {
     let size = [96, 64];
-    let bake = bake::Options { groups: true, vertices: 20_000, ..bake::Options::default() };
+    let bake = bake::Options { groups: true, vertices: 12_000, ..bake::Options::default() };
     let options = frame::Options { size, bake, bounces, ..frame::Options::default() };
     let found = gpu.picture(scene, options, f32::INFINITY);
     let placements = scene.at(0.0);

@@ -14,6 +14,7 @@ use crate::asset::topology::Sets;
 use crate::layout::{CLUSTER_VERTICES, GROUP_CLUSTERS};
 use glam::Vec3;
 use rayon::prelude::*;
+use std::ops::Range;
 
 /// The distance, in bounding radii, that the length of a normal counts as. It is a little more than the edge of a cube
 /// with that radius (1.15), so that the sides of a cube come apart first. Weights from 0.25 to 5 change the sum of all
@@ -36,6 +37,12 @@ type Point = ([f32; 6], u32);
 
 /// Where the runs of a cluster end, in vertices from its first. Those that it lacks are empty.
 pub(crate) type RunEnds = [u8; CLUSTER_RUNS];
+
+/// The runs of a cluster, in vertices from its first, without empty ones.
+pub(crate) fn runs(ends: &RunEnds) -> impl Iterator<Item = Range<usize>> {
+    let starts = std::iter::once(0).chain(*ends);
+    starts.zip(*ends).filter(|(start, end)| start < end).map(|(start, end)| start.into()..end.into())
+}
 
 /// The vertices of a mesh in the order of its clusters.
 pub(crate) struct ClusterOrder {
@@ -138,16 +145,9 @@ mod tests {
     use crate::asset::generate;
 
     /// The vertices of every run.
-    fn runs(order: &ClusterOrder) -> Vec<&[u32]> {
-        let mut runs = Vec::new();
-        for (vertices, ends) in order.vertices.chunks(CLUSTER_VERTICES as usize).zip(&order.runs) {
-            let mut start = 0;
-            for end in ends.map(usize::from) {
-                runs.extend((end > start).then_some(&vertices[start..end]));
-                start = end;
-            }
-        }
-        runs
+    fn all_runs(order: &ClusterOrder) -> Vec<&[u32]> {
+        let clusters = order.vertices.chunks(CLUSTER_VERTICES as usize).zip(&order.runs);
+        clusters.flat_map(|(vertices, ends)| runs(ends).map(move |run| &vertices[run])).collect()
     }
 
     /// A plane that is cut in two along a row of vertices, which each part has: no run has both parts.
@@ -163,7 +163,7 @@ mod tests {
         let order = cluster_order(&mesh);
         let is_cut = |run: &&[u32]| run.iter().any(|v| mesh.positions[*v as usize].x.abs() < 1e-6);
         let has_both = |run: &&[u32]| run.iter().any(|v| *v < count) && run.iter().any(|v| *v >= count);
-        let cut: Vec<&[u32]> = runs(&order).into_iter().filter(is_cut).collect();
+        let cut: Vec<&[u32]> = all_runs(&order).into_iter().filter(is_cut).collect();
         assert!(cut.len() > 5 && !cut.iter().any(has_both), "{cut:?}");
     }
 
@@ -178,7 +178,7 @@ mod tests {
         let triangles = (0..40).flat_map(|i| bar.triangles.iter().map(move |t| t.map(|v| v + i * count)));
         let mesh = Mesh::new("bars", positions.collect(), normals, None, triangles.collect()).unwrap();
         let order = cluster_order(&mesh);
-        let runs = runs(&order);
+        let runs = all_runs(&order);
         let normal = |v: u32| mesh.normals[v as usize];
         assert!(
             runs.iter()

@@ -3,12 +3,12 @@
 //!
 //! Nothing of a group moves against it, so what a vertex sees is decided when its own visibility is baked, by the same
 //! rays. Each ray that meets a front has a share of the cosine-weighted hemisphere, and goes to the smallest run around
-//! the place that it meets. Runs that are too small as seen from the vertex become parts
-//! of larger ones, if those are seen too, and all that light from a far wall takes is one link (Hanrahan, Salzman,
-//! Aupperle, *A Rapid Hierarchical Radiosity Algorithm*, 1991). The sum of a vertex's links is the share of the
-//! hemisphere that shows fronts of the group.
+//! the place that it meets. Runs that are too small as seen from the vertex become parts of larger ones, if those are
+//! seen too, and all that light from a far wall takes is one link (Hanrahan, Salzman, Aupperle, *A Rapid Hierarchical
+//! Radiosity Algorithm*, 1991). The sum of a vertex's links is the share of the hemisphere that shows fronts of the
+//! group.
 
-use super::cluster_order::{CLUSTER_RUNS, RUN_VERTICES, RunEnds};
+use super::cluster_order::{CLUSTER_RUNS, RUN_VERTICES, RunEnds, runs};
 use crate::layout::CLUSTER_VERTICES;
 use crate::shaders::ShaderPermutation;
 use glam::Vec3;
@@ -83,15 +83,8 @@ impl MemberRuns {
             let firsts = (0..self.vertices).step_by(RUNS[size]);
             return firsts.map(|first| (first, RUNS[size].min(self.vertices - first))).collect();
         }
-        let of_cluster = |(cluster, ends): (usize, &RunEnds)| {
-            let mut start = 0;
-            ends.map(|end| {
-                let span = (RUNS[1] * cluster + start, usize::from(end) - start);
-                start = end.into();
-                span
-            })
-        };
-        self.ends.iter().enumerate().flat_map(of_cluster).filter(|(_, count)| *count > 0).collect()
+        let clusters = (0..).step_by(RUNS[1]).zip(&self.ends);
+        clusters.flat_map(|(first, ends)| runs(ends).map(move |run| (first + run.start, run.len()))).collect()
     }
 }
 
@@ -105,11 +98,7 @@ impl Runs {
             first
         };
         let member = |ends: &[RunEnds]| {
-            let of_cluster = |ends: &RunEnds| {
-                let last = ends[CLUSTER_RUNS - 1];
-                ends.iter().position(|end| *end == last).map_or(0, |last| last + 1)
-            };
-            let mut smallest: Vec<u32> = ends.iter().map(|ends| next(of_cluster(ends))).collect();
+            let mut smallest: Vec<u32> = ends.iter().map(|ends| next(runs(ends).count())).collect();
             let middle = next(ends.len());
             smallest.push(middle);
             let last = ends.last().map_or(0, |ends| usize::from(ends[CLUSTER_RUNS - 1]));
@@ -125,20 +114,16 @@ impl Runs {
         self.count
     }
 
-    /// The number of the run of a size around a place in the order of a member.
-    pub fn at(&self, size: usize, member: usize, place: usize) -> u32 {
-        let MemberRuns { firsts, smallest, ends, .. } = &self.members[member];
+    /// The number of the run of a size that was met.
+    fn of(&self, size: usize, met: &Met) -> u32 {
+        let MemberRuns { firsts, smallest, ends, .. } = &self.members[met.member as usize];
+        let place = met.place as usize;
         if size > 0 {
             return firsts[size] + (place / RUNS[size]) as u32;
         }
         let cluster = place / RUNS[1];
         let within = (place % RUNS[1]) as u8;
         smallest[cluster] + ends[cluster].partition_point(|end| *end <= within) as u32
-    }
-
-    /// The number of the run of a size that was met.
-    fn of(&self, size: usize, met: &Met) -> u32 {
-        self.at(size, met.member as usize, met.place as usize)
     }
 
     /// Numbers of the runs of one size, `RUNS[size]`, and what [`Runs::all`] has of each.

@@ -4,6 +4,7 @@ use super::boxes::{LEAST_COSINE, NARROWED};
 use super::movers::{Movers, OUTGOING, OVER, SMOOTH, UNFACED};
 use super::relaxation::MOST_STEPS;
 use super::{Bounce, RunBlock, Steps};
+use crate::bake::cluster_order::runs;
 use crate::bake::links::{RUNS, pack, unpack, unpack_direction};
 use crate::error::Result;
 use crate::field::cuboid::Cuboid;
@@ -141,11 +142,8 @@ impl HostLinks {
             let mut means = vec![(block.large as usize, mean(places.clone()))];
             for (cluster, start) in places.clone().step_by(RUNS[1]).enumerate() {
                 means.push((block.middle as usize + cluster, mean(start..places.end.min(start + RUNS[1]))));
-                let ends = block.ends[cluster].map(|end| start + usize::from(end));
-                let starts = std::iter::once(start).chain(ends);
-                let smallest = starts.zip(ends).filter(|(start, end)| start < end);
-                let numbered = (block.smallest[cluster] as usize..).zip(smallest);
-                means.extend(numbered.map(|(run, (start, end))| (run, mean(start..end))));
+                let smallest = (block.smallest[cluster] as usize..).zip(runs(&block.ends[cluster]));
+                means.extend(smallest.map(|(run, of)| (run, mean(start + of.start..start + of.end))));
             }
             means
         };

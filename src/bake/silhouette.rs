@@ -106,54 +106,79 @@ fn frames(mesh: &Mesh, nodes: &NodeGrid, count: usize) -> Vec<MapFrame> {
 struct View {
     /// Pixels along an edge.
     px: usize,
-    /// Nearest and farthest depth of every pixel, row by row, in r; the other way about where nothing covers its middle.
-    depths: Vec<[f32; 2]>,
+    /// Of every pixel, row by row, in r: positive infinity where nothing covers its middle.
+    nearest: Vec<f32>,
+    /// The same, negative infinity where nothing does.
+    farthest: Vec<f32>,
 }
 
 impl View {
-    const NOTHING: [f32; 2] = [f32::INFINITY, f32::NEG_INFINITY];
-
     /// `places` has each vertex on the map, -1 to 1 from edge to edge, and its depth.
     fn new(places: &[Vec3], triangles: &[[u32; 3]], side: Side, px: usize) -> Self {
-        let mut view = View { px, depths: vec![Self::NOTHING; px * px] };
+        let mut view = View { px, nearest: vec![f32::INFINITY; px * px], farthest: vec![f32::NEG_INFINITY; px * px] };
         let half = 0.5 * px as f32;
-        let pixels: Vec<Vec3> = places.iter().map(|p| ((p.truncate() + 1.0) * half).extend(p.z)).collect();
-        let sign = side.sign();
+        // Whole numbers are the middles of pixels.
+        let pixels: Vec<Vec3> = places.iter().map(|p| ((p.truncate() + 1.0) * half - 0.5).extend(p.z)).collect();
         for triangle in triangles {
             let corners = triangle.map(|v| pixels[v as usize]);
-            view.add(corners, |depth| sign == 0.0 || depth * sign >= 0.0);
+            view.add(corners, side.sign());
         }
         view
     }
 
-    /// Adds what a triangle shows of depths that count.
-    fn add(&mut self, [a, b, c]: [Vec3; 3], counts: impl Fn(f32) -> bool) {
-        // Middles of pixels that the box around it holds.
-        let low = (a.min(b).min(c) - 0.5).ceil().max(Vec3::ZERO);
-        let high = (a.max(b).max(c) - 0.5).floor().min(Vec3::splat(self.px as f32 - 1.0));
-        if low.x > high.x || low.y > high.y {
+    /// Adds what a triangle shows of depths with this sign, or of all where it is 0: row by row from edge to edge.
+    /// Triangles that share an edge find the same places on it, so no pixel between them stays empty.
+    fn add(&mut self, [a, b, c]: [Vec3; 3], sign: f32) {
+        let low = a.min(b).min(c);
+        let high = a.max(b).max(c);
+        let rows = low.y.max(0.0).ceil() as usize..(high.y.min(self.px as f32 - 1.0).floor() + 1.0) as usize;
+        if rows.is_empty() || low.x.ceil() > high.x {
             return;
         }
-        let [flat_a, flat_b, flat_c] = [a, b, c].map(Vec3::truncate);
-        let area = (flat_b - flat_a).perp_dot(flat_c - flat_a);
-        for y in low.y as usize..=high.y as usize {
-            for x in low.x as usize..=high.x as usize {
-                let place = Vec2::new(x as f32 + 0.5, y as f32 + 0.5);
-                let [to_a, to_b, to_c] = [flat_a, flat_b, flat_c].map(|corner| corner - place);
-                let weights = Vec3::new(to_b.perp_dot(to_c), to_c.perp_dot(to_a), to_a.perp_dot(to_b)) / area;
-                let depth = weights.dot(Vec3::new(a.z, b.z, c.z));
-                if weights.min_element() >= 0.0 && counts(depth) {
-                    let [nearest, farthest] = &mut self.depths[y * self.px + x];
-                    *nearest = nearest.min(depth);
-                    *farthest = farthest.max(depth);
+        let [to_b, to_c] = [b - a, c - a];
+        let area = to_b.truncate().perp_dot(to_c.truncate());
+        let slope = Vec2::new(to_b.z * to_c.y - to_c.z * to_b.y, to_c.z * to_b.x - to_b.z * to_c.x) / area;
+        if !slope.is_finite() {
+            return;
+        }
+        for y in rows {
+            let row = y as f32;
+            let mut from = f32::INFINITY;
+            let mut to = f32::NEG_INFINITY;
+            for (p, q) in [(a, b), (b, c), (c, a)] {
+                let (p, q) = if (p.y, p.x) <= (q.y, q.x) { (p, q) } else { (q, p) };
+                if p.y <= row && row <= q.y && p.y < q.y {
+                    let x = p.x + (row - p.y) / (q.y - p.y) * (q.x - p.x);
+                    from = from.min(x);
+                    to = to.max(x);
                 }
+            }
+            let from = from.max(0.0).ceil();
+            let to = to.min(self.px as f32 - 1.0).floor();
+            if from > to {
+                continue;
+            }
+            let first = a.z + slope.dot(Vec2::new(from, row) - a.truncate());
+            let pixels = y * self.px + from as usize..y * self.px + to as usize + 1;
+            let nearest = &mut self.nearest[pixels.clone()];
+            let farthest = &mut self.farthest[pixels];
+            // Indices and selections: other forms of this loop get no vector instructions.
+            for i in 0..nearest.len().min(farthest.len()) {
+                let depth = first + i as i32 as f32 * slope.x;
+                // That of a triangle seen from its edge runs beyond its corners.
+                let depth = if depth < low.z { low.z } else { depth };
+                let depth = if depth > high.z { high.z } else { depth };
+                let counts = depth * sign >= 0.0;
+                nearest[i] = if counts & (depth < nearest[i]) { depth } else { nearest[i] };
+                farthest[i] = if counts & (depth > farthest[i]) { depth } else { farthest[i] };
             }
         }
     }
 
     /// Middle between the nearest and the farthest surface of a pixel: at an outline both are near it.
     fn depth(&self, x: usize, y: usize) -> Option<f32> {
-        let [nearest, farthest] = self.depths[y * self.px + x];
+        let nearest = self.nearest[y * self.px + x];
+        let farthest = self.farthest[y * self.px + x];
         (nearest <= farthest).then_some(0.5 * (nearest + farthest))
     }
 

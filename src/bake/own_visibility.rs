@@ -239,10 +239,14 @@ pub struct Standing {
     pub radius: f64,
 }
 
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug)]
 pub struct Seen {
-    /// `channel_stride(bands)` floats, in the object's frame.
-    pub transfer: Vec<f32>,
+    /// The point from which it is seen, in the member's frame; [`see`] leaves it 0.
+    pub from: Vec3,
+    /// What blocked rays take of the clamped cosine, in the normal's frame.
+    taken: [f32; MAX_COEFFICIENTS],
+    /// Whether no light comes here.
+    is_covered: bool,
     pub map: Vec<u8>,
     /// Share of the cosine-weighted hemisphere that is blocked.
     pub blocked: f64,
@@ -252,9 +256,6 @@ pub struct Seen {
     pub buried: bool,
     /// Fronts that the rays met, of [`Rays::Many`] alone.
     pub fronts: Vec<Front>,
-    /// A bit for each of the group's suns of which nothing can be seen, and all, of [`Rays::Many`] alone; [`see`] leaves
-    /// them 0.
-    pub suns: [u32; 2],
 }
 
 #[derive(Clone, Copy, Debug)]
@@ -273,9 +274,24 @@ pub struct Front {
 }
 
 impl Seen {
+    /// The transfer vector of a point that sees the same in the frame of its own normal: `channel_stride(bands)` floats in
+    /// the object's frame.
+    pub fn transfer(&self, bands: usize, normal: Vec3) -> Vec<f32> {
+        let mut transfer = vec![0.0; channel_stride(bands)];
+        if !self.is_covered {
+            let normal = normal.as_dvec3();
+            let lobe = clamped_cosine(bands, normal);
+            let mut taken = [0.0; MAX_COEFFICIENTS];
+            Rotation::new(bands, DQuat::from_mat3(&frame(normal))).apply(&self.taken.map(f64::from), &mut taken);
+            let all = transfer.iter_mut().zip(&lobe[..coefficient_count(bands)]).zip(&taken);
+            all.for_each(|((found, lobe), taken)| *found = (lobe - taken) as f32);
+        }
+        transfer
+    }
+
     /// Takes all light from the point.
     pub fn cover(&mut self) {
-        self.transfer.fill(0.0);
+        self.is_covered = true;
         self.fronts.clear();
         self.blocked = 1.0;
         if let Some((angles, distances)) = self.map.split_at_mut_checked(NODES) {
@@ -378,6 +394,9 @@ impl Caster<'_> {
     /// How far each ray comes past all that the map counts; infinity where it is free.
     fn map_distances(&self, locals: &[Vec3A]) -> Vec<f32> {
         let in_map = self.counts.in_map.expect("asked for maps alone");
+        if in_map.is_empty() {
+            return vec![f32::INFINITY; locals.len()];
+        }
         let mut hits = Vec::with_capacity(locals.len());
         self.blockers.first_of(self.origin, &self.to_blockers, locals, in_map, &mut hits);
         hits.iter().map(distance).collect()
@@ -403,22 +422,29 @@ fn locals<'r>(rays: impl IntoIterator<Item = &'r PatternRay>) -> Vec<Vec3A> {
     rays.into_iter().map(|ray| ray.local).collect()
 }
 
-pub fn see(blockers: &Blockers, standing: &Standing, eye: &Eye, bands: usize, rays: Rays, counts: Counts<'_>) -> Seen {
-    let normal = eye.normal.as_dvec3();
-    let to_object = frame(normal);
+pub fn see(blockers: &Blockers, standing: &Standing, eye: &Eye, rays: Rays, counts: Counts<'_>) -> Seen {
+    let to_object = frame(eye.normal.as_dvec3());
     let caster = Caster {
         blockers,
         origin: Vec3A::from(eye.origin),
         to_blockers: Mat3A::from((standing.rotation * to_object).as_mat3()),
         counts,
     };
-    let mut seen = Seen::default();
-    // In the normal's frame, in which rays have the same coefficients for every point.
-    let mut local = [0.0_f32; MAX_COEFFICIENTS];
-    let count = coefficient_count(bands);
+    let mut seen = Seen {
+        from: Vec3::ZERO,
+        taken: [0.0; MAX_COEFFICIENTS],
+        is_covered: false,
+        map: Vec::new(),
+        blocked: 0.0,
+        behind: 0.0,
+        buried: false,
+        fronts: Vec::new(),
+    };
     let mut add = |ray: &PatternRay, hit: &Option<BlockerHit>| {
         let Some(found) = hit else { return };
-        local[..count].iter_mut().zip(&ray.share[..count]).for_each(|(sum, share)| *sum += share);
+        for k in 0..MAX_COEFFICIENTS {
+            seen.taken[k] += ray.share[k];
+        }
         seen.blocked += ray.weight / PI;
         seen.behind += if found.from_behind { ray.weight / PI } else { 0.0 };
     };
@@ -437,13 +463,6 @@ pub fn see(blockers: &Blockers, standing: &Standing, eye: &Eye, bands: usize, ra
                 seen.map = found.map(&caster, standing);
             }
         }
-    }
-    seen.transfer = vec![0.0; channel_stride(bands)];
-    let lobe = clamped_cosine(bands, normal);
-    let mut blocked = [0.0; MAX_COEFFICIENTS];
-    Rotation::new(bands, DQuat::from_mat3(&to_object)).apply(&local.map(f64::from), &mut blocked);
-    for k in 0..count {
-        seen.transfer[k] = (lobe[k] - blocked[k]) as f32;
     }
     seen
 }
@@ -485,7 +504,9 @@ impl CellHits {
     fn new(caster: &Caster<'_>) -> Self {
         let pattern = &*MANY_RAYS;
         let with_map = caster.counts.in_map.is_some();
-        let toward = locals(&pattern.rays);
+        // Those above the horizon are for edges of the map.
+        let has_edges = caster.counts.in_map.is_some_and(|members| !members.is_empty());
+        let toward = locals(&pattern.rays[..if has_edges { PATTERN + HORIZON } else { PATTERN }]);
         let hits = caster.cast(&toward);
         let distances = if with_map { caster.map_distances_past(&toward, &hits) } else { Vec::new() };
         let at_map_edge = |cell: usize| {
@@ -648,7 +669,7 @@ mod tests {
         let eye = Eye { origin: Vec3::ZERO, normal: Vec3::Y };
         let counts = Counts { blocks: &[true; 8], in_map: with_map.then_some(&[7]), targets: &[], screens: &[] };
         let standing = Standing { rotation: DMat3::IDENTITY, radius: 1.0 };
-        see(&Blockers::new(corners.map(triangle), Vec::new(), Vec::new()), &standing, &eye, 4, Rays::Many, counts)
+        see(&Blockers::new(corners.map(triangle), Vec::new(), Vec::new()), &standing, &eye, Rays::Many, counts)
     }
 
     /// Directions all over the sphere, of equal areas: a Fibonacci lattice.
@@ -683,7 +704,7 @@ mod tests {
                 }
             }
             let square = |values: &mut dyn Iterator<Item = f64>| values.map(|v| v * v).sum::<f64>().sqrt();
-            let error = square(&mut seen.transfer.iter().zip(&wanted).map(|(a, b)| f64::from(*a) - b));
+            let error = square(&mut seen.transfer(4, Vec3::Y).iter().zip(&wanted).map(|(a, b)| f64::from(*a) - b));
             let whole = square(&mut wanted.iter().copied());
             println!("{toward}: {:.4}", error / whole);
             assert!(error < 0.006 * whole, "{toward}: {error} of {whole}");
@@ -712,7 +733,7 @@ mod tests {
                 directions.iter().zip(&hits).filter(|(_, hit)| hit.is_some()).map(|(d, _)| f64::from(d.y)).sum();
             let wanted = wanted / directions.iter().map(|d| f64::from(d.y)).sum::<f64>();
             let counts = Counts { blocks: &[true], in_map: None, targets: &[], screens: &[] };
-            let found = see(&blockers, &standing, &eye, 4, Rays::Many, counts).blocked;
+            let found = see(&blockers, &standing, &eye, Rays::Many, counts).blocked;
             mean += (found / wanted - 1.0) / PLACES as f64;
             square += (found / wanted - 1.0).powi(2) / PLACES as f64;
         }
@@ -757,7 +778,6 @@ mod tests {
                 &Blockers::new(corners.iter().copied().map(triangle), Vec::new(), Vec::new()),
                 &standing,
                 &eye,
-                4,
                 Rays::Many,
                 counts,
             )

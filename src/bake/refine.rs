@@ -5,7 +5,7 @@
 //! lengths the bars of window frames take all that a wall behind a blackboard needs. A triangle is bisected at its longest edge first, so that angles stay bounded (Rivara, *Mesh Refinement Processes Based on the
 //! Generalized Bisection of Simplices*, 1984). Both sides of an edge are split together: there are no T-junctions.
 
-use super::own_visibility::{Rays, Seen};
+use super::own_visibility::Rays;
 use super::surfaces::{GroupSpace, triangles_around};
 use crate::asset::Mesh;
 use crate::asset::mesh::Attributes;
@@ -175,7 +175,9 @@ impl Refined {
         let nudges = space.nudges(&self.positions, &self.normals, &self.triangles);
         let Refined { transfers, positions, normals, .. } = self;
         transfers.par_iter_mut().enumerate().for_each(|(v, transfer)| {
-            transfer.get_or_insert_with(|| space.see(positions[v], normals[v], nudges[v], Rays::Few).transfer);
+            transfer.get_or_insert_with(|| {
+                space.transfer(&space.see(positions[v], normals[v], nudges[v], Rays::Few), normals[v])
+            });
         });
         let mut edges: Vec<Edge> = self.edges().into_iter().collect();
         edges.retain(|edge| !self.middles.contains_key(edge) && self.length(*edge) > least_m);
@@ -186,10 +188,11 @@ impl Refined {
             let position = 0.5 * (self.positions[a_index] + self.positions[b_index]);
             let normal = (self.normals[a_index] + self.normals[b_index]).normalize_or(self.normals[a_index]);
             let nudge = 0.5 * (nudges[a_index] + nudges[b_index]);
-            let Seen { transfer, buried, .. } = space.see(position, normal, nudge, Rays::Few);
+            let seen = space.see(position, normal, nudge, Rays::Few);
+            let transfer = space.transfer(&seen, normal);
             let ends = transfer_of(a_index).iter().zip(transfer_of(b_index));
             let squares = transfer.iter().zip(ends).map(|(middle, (a, b))| (middle - 0.5 * (a + b)).powi(2));
-            let difference = if buried { 0.0 } else { squares.sum::<f32>().sqrt() / COSINE_LENGTH };
+            let difference = if seen.buried { 0.0 } else { squares.sum::<f32>().sqrt() / COSINE_LENGTH };
             let is_flat = self.normals[a_index].dot(self.normals[b_index]) > FLAT;
             let place = |v: usize| self.positions[v] + nudges[v];
             let is_crossed = difference < CROSSED && is_flat && space.is_between(place(a_index), place(b_index));

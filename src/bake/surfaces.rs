@@ -17,7 +17,7 @@ use crate::asset::grid::Grid;
 use crate::asset::mesh::Attributes;
 use crate::asset::texture::Texture;
 use crate::field::quantity::channel_stride;
-use crate::field::self_visibility::{self, BYTES};
+use crate::field::self_visibility::{self, BYTES, frame};
 use crate::layout::{CLUSTER_VERTICES, MOST_SUNS, pack_suns};
 use crate::scene::groups::Groups;
 use crate::scene::{Placement, Scene};
@@ -30,7 +30,7 @@ use std::sync::{Arc, OnceLock};
 use std::time::Instant;
 
 /// Counts in every name of the cache: another number where a bake of surfaces computes something else.
-const VERSION: u32 = 55;
+const VERSION: u32 = 58;
 /// How far towards the middle of its triangles a vertex is seen from, as a share of the way: the light of a crease is
 /// that just inside each face. Where meshes are left as they are, so are the places from which they are seen.
 const NUDGE: f32 = 0.02;
@@ -50,6 +50,11 @@ const AROUND: f64 = 0.6;
 const LOOKS: [usize; 2] = [16, 64];
 /// Angular radius below which the shadows of a sun have edges that surfaces follow: 3 degrees.
 const CRISP_RAD: f64 = 0.05;
+/// Vertices that are closer than this share of a group's extent, and of their mesh's bounding radius, and whose normals lie
+/// within 6 degrees share their rays: round edges have several times the vertices that light needs.
+const ALIKE: f32 = 0.001;
+const ALIKE_MESH: f32 = 0.01;
+const ALIKE_COSINE: f32 = 0.9945;
 /// Where rays to a sun leave its middle, in its angular radii, along two axes.
 const SUN_RAYS: [[f64; 2]; 5] = [[0.0, 0.0], [0.8, 0.0], [0.0, 0.8], [-0.8, 0.0], [0.0, -0.8]];
 /// Of the vertices to which surfaces may grow one in so many is added at least, however many there were: a floor below a
@@ -69,6 +74,8 @@ pub(super) const BURIED_BLOCKED: f64 = 0.35;
 /// than such a share of their extent.
 const LEAST_COMMON: f32 = 0.5;
 const MOST_HEIGHT: f32 = 0.35;
+/// Normals have such a cosine with that of their face where they are about the same: 18 degrees.
+const LEAST_ALONG: f32 = 0.95;
 /// Share of its height above a vertex that a point keeps above the triangles of a hollow on its way along the surface, and
 /// the sine from which on a triangle rises.
 const HOLLOW: f32 = 0.5;
@@ -463,10 +470,7 @@ impl GroupPlan {
     /// `start`: vertices of what is refined, as it came.
     fn limits(&self, group: &Group<'_>, start: usize) -> Option<Limits> {
         let (vertices, moves) = self.refinement?;
-        // What stands on a ground decides what is fine, not the ground.
-        let solid: Vec<(DVec3, f64)> =
-            group.spheres.iter().zip(&self.members).filter(|(_, m)| !m.mesh.is_flat()).map(|(s, _)| *s).collect();
-        let extent = around_spheres(&solid).map_or(2.0, |(_, radius)| 2.0 * radius) as f32;
+        let extent = extent(self, &group.spheres);
         let flat_area: f64 = group
             .standings
             .iter()
@@ -495,6 +499,8 @@ pub(super) struct Group<'p> {
     spheres: Vec<(DVec3, f64)>,
     /// Of each member in its own frame, metres.
     boxes: Vec<[DVec3; 2]>,
+    /// Vertices are close to each other within this.
+    alike: f32,
     /// Where lamps light things from close by.
     targets: Vec<Target>,
     /// The plan's screens in this frame.
@@ -540,7 +546,8 @@ impl<'p> Group<'p> {
         let targets = targets(&plan.members, &spheres);
         let screens =
             plan.screens.iter().flatten().map(|corners| corners.map(|corner| (corner - centre) / radius_m)).collect();
-        Group { plan, blockers, centre, radius_m, standings, spheres, boxes, targets, screens }
+        let alike = ALIKE * extent(plan, &spheres);
+        Group { plan, blockers, centre, radius_m, standings, spheres, boxes, alike, targets, screens }
     }
 
     /// A place of the world in the group's frame.
@@ -559,6 +566,14 @@ impl<'p> Group<'p> {
         let others = (0..).zip(&blocks).map(|(i, blocks)| i != member && *blocks).collect();
         GroupSpace { group: self, member, blocks, others }
     }
+}
+
+/// Width of a group, in its frame: what stands on a ground decides what is fine, not the ground. `spheres` are those of all
+/// members.
+fn extent(plan: &GroupPlan, spheres: &[(DVec3, f64)]) -> f32 {
+    let solid: Vec<(DVec3, f64)> =
+        spheres.iter().zip(&plan.members).filter(|(_, m)| !m.mesh.is_flat()).map(|(s, _)| *s).collect();
+    around_spheres(&solid).map_or(2.0, |(_, radius)| 2.0 * radius) as f32
 }
 
 /// Spheres around the members that a lamp of the group lights from close by. `spheres` are those of all
@@ -662,17 +677,42 @@ impl GroupSpace<'_> {
         let eye = Eye { origin: self.placed(position + nudge).into(), normal };
         let standing = &group.standings[self.member];
         let counts = Counts { blocks: &self.blocks, in_map, targets: &group.targets, screens: &group.screens };
-        let mut seen = see(&group.blockers, standing, &eye, group.plan.bands, rays, counts);
+        let mut seen = see(&group.blockers, standing, &eye, rays, counts);
+        seen.from = position + nudge;
         let is_covered = self.is_covered(position, normal, nudge);
         if is_covered {
             seen.cover();
         }
-        if rays == Rays::Many {
-            seen.suns = self.seen_suns(position + nudge, normal);
-        }
         let sees_backs = seen.blocked > BURIED_BLOCKED && seen.behind > BURIED_BACKS * seen.blocked;
         seen.buried = group.plan.refinement.is_some() && (is_covered || sees_backs);
         seen
+    }
+
+    pub fn transfer(&self, seen: &Seen, normal: Vec3) -> Vec<f32> {
+        seen.transfer(self.group.plan.bands, normal)
+    }
+
+    /// For each vertex of a cluster the place in it of the first one that stands and faces almost as it does, with nothing
+    /// between them: its rays serve both.
+    fn seers(&self, mesh: &Mesh, nudges: &[Vec3], cluster: &[u32]) -> Vec<usize> {
+        let place = |v: usize| mesh.positions[v] + nudges[v];
+        let near = (self.group.alike / self.scale()).min(ALIKE_MESH * mesh.bounding_sphere().1);
+        let mut seers: Vec<usize> = Vec::with_capacity(cluster.len());
+        for (at, v) in cluster.iter().map(|v| *v as usize).enumerate() {
+            let frame_here = frame(mesh.normals[v].as_dvec3());
+            let serves = |&other: &usize| {
+                let o = cluster[other] as usize;
+                let is_near = seers[other] == other && place(o).distance_squared(place(v)) < near * near;
+                is_near && mesh.normals[o].dot(mesh.normals[v]) > ALIKE_COSINE && {
+                    // A frame of axes jumps somewhere.
+                    let turns = frame(mesh.normals[o].as_dvec3()).x_axis.dot(frame_here.x_axis);
+                    turns > f64::from(ALIKE_COSINE) && (place(o) == place(v) || !self.is_between(place(o), place(v)))
+                }
+            };
+            let seer = (0..at).find(serves).unwrap_or(at);
+            seers.push(seer);
+        }
+        seers
     }
 
     /// Whether anything stands between two points of the member's frame.
@@ -733,7 +773,9 @@ impl GroupSpace<'_> {
                 let off = blend(&|v| nudges[v].dot(mesh.normals[v]) * mesh.normals[v]);
                 self.seen_suns(blend(&|v| mesh.positions[v]) + off, blend(&|v| mesh.normals[v]))[0]
             };
-            ON_TRIANGLE.map(hidden_at).into_iter().fold(u32::MAX, |all, hidden| all & hidden)
+            let hidden = triangle.iter().fold(0, |all, &v| all | seen[v as usize][0]);
+            // Nothing is left to tell of most.
+            ON_TRIANGLE.iter().fold(hidden, |all, at| if all == 0 { 0 } else { all & hidden_at(*at) })
         };
         let on_triangles: Vec<u32> = mesh.triangles.par_iter().map(on).collect();
         let mut around: Vec<u32> = seen.iter().map(|[hidden, _]| *hidden).collect();
@@ -850,6 +892,9 @@ impl GroupSpace<'_> {
         let mut suns = vec![[0; 2]; mesh.positions.len()];
         let mut any_blocked = false;
         let mut any_in_map = false;
+        let shades_itself = shades_itself(&mesh);
+        let is_in_map =
+            |member: &u32| self.blocks[*member as usize] && (shades_itself || *member as usize != self.member);
         let mut linked = Links::default();
         let clusters: Vec<&[u32]> = order.chunks(CLUSTER_VERTICES as usize).collect();
         let mut done = 0;
@@ -857,8 +902,7 @@ impl GroupSpace<'_> {
             let look = |cluster: &&[u32]| {
                 let places = cluster.iter().map(|&v| mesh.positions[v as usize]);
                 let near = if has_maps { self.near(places, &members_around) } else { Vec::new() };
-                let blocks = |member: &u32| self.blocks[*member as usize];
-                let in_map: Vec<u32> = near.iter().copied().filter(blocks).collect();
+                let in_map: Vec<u32> = near.iter().copied().filter(&is_in_map).collect();
                 let vertex = |&v: &u32| {
                     let v = v as usize;
                     let normal = mesh.normals[v];
@@ -897,8 +941,8 @@ impl GroupSpace<'_> {
                     };
                     inwards.find(free).or_else(along).map_or(here, see)
                 };
-                let linked = |v: &u32| {
-                    let mut seen = vertex(v);
+                let linked = |place: usize| {
+                    let mut seen = vertex(&cluster[place]);
                     let fronts = std::mem::take(&mut seen.fronts).into_iter();
                     let met = fronts.map(|Front { member, triangle, weights, toward, apart, share, .. }| {
                         let lit = &lit[member as usize];
@@ -908,26 +952,54 @@ impl GroupSpace<'_> {
                     });
                     (seen, links(met.collect(), runs))
                 };
-                let seen: Vec<(Seen, Vec<Link>)> = cluster.par_iter().with_max_len(8).map(linked).collect();
-                (near, seen)
+                let mut seers = self.seers(&mesh, nudges, cluster);
+                let each = (0..cluster.len()).into_par_iter().with_max_len(8);
+                let mut seen: Vec<Option<(Seen, Vec<Link>)>> =
+                    each.clone().map(|at| (seers[at] == at).then(|| linked(at))).collect();
+                // What lies below something, or was seen from beside it, tells nothing of its neighbours.
+                let serves = |at: usize| {
+                    let v = cluster[at] as usize;
+                    let here = |seen: &Seen| !seen.buried && seen.from == mesh.positions[v] + nudges[v];
+                    seen[at].as_ref().is_some_and(|(seen, _)| here(seen))
+                };
+                let alone: Vec<usize> =
+                    (0..cluster.len()).filter(|&at| seers[at] != at && !serves(seers[at])).collect();
+                let found: Vec<(Seen, Vec<Link>)> = alone.par_iter().map(|&at| linked(at)).collect();
+                for (at, found) in alone.into_iter().zip(found) {
+                    seers[at] = at;
+                    seen[at] = Some(found);
+                }
+                // Suns have sharp edges, which each vertex finds by itself.
+                let own = |at: usize| {
+                    let v = cluster[at] as usize;
+                    let seer = cluster[seers[at]] as usize;
+                    let (seen, _) = seen[seers[at]].as_ref().expect("of a vertex that casts rays");
+                    let aside = mesh.positions[v] + nudges[v] - mesh.positions[seer] - nudges[seer];
+                    let suns = self.seen_suns(seen.from + aside, mesh.normals[v]);
+                    (self.transfer(seen, mesh.normals[v]), suns)
+                };
+                let own = each.map(own).collect();
+                ClusterSeen { near, seers, seen, own }
             };
-            let found: Vec<(Vec<u32>, Vec<(Seen, Vec<Link>)>)> = batch.par_iter().map(look).collect();
-            for (cluster, (members, seen)) in batch.iter().zip(found) {
-                for (&v, (seen, links)) in cluster.iter().zip(seen) {
+            let found: Vec<ClusterSeen> = batch.par_iter().map(look).collect();
+            for (cluster, found) in batch.iter().zip(found) {
+                for (at, &v) in cluster.iter().enumerate() {
+                    let (seen, links) = found.seen[found.seers[at]].as_ref().expect("of a vertex that casts rays");
+                    let (own_transfer, own_suns) = &found.own[at];
                     linked.counts.push(links.len() as u8);
                     linked.packed.extend(links.iter().map(|link| link.packed));
                     if !plan.screens.is_empty() {
                         linked.directions.extend(links.iter().map(|link| link.direction));
                     }
-                    suns[v as usize] = seen.suns;
+                    suns[v as usize] = *own_suns;
                     any_blocked |= seen.blocked > 0.0;
-                    transfer[v as usize * stride..][..stride].copy_from_slice(&seen.transfer);
+                    transfer[v as usize * stride..][..stride].copy_from_slice(own_transfer);
                     if has_maps {
                         maps[v as usize * BYTES..][..BYTES].copy_from_slice(&seen.map);
                     }
                 }
-                any_in_map |= members.iter().any(|member| self.blocks[*member as usize]);
-                near.push(members);
+                any_in_map |= found.near.iter().any(is_in_map);
+                near.push(found.near);
                 done += cluster.len();
             }
             told(done);
@@ -942,6 +1014,29 @@ impl GroupSpace<'_> {
             told_suns,
         }
     }
+}
+
+/// Whether a mesh may block what its vertices see: what is flat does not, nor what is convex if its normals are about those
+/// of its faces.
+fn shades_itself(mesh: &Mesh) -> bool {
+    let is_bent = |triangle: &[u32; 3]| {
+        let [a, b, c] = triangle.map(|v| mesh.positions[v as usize]);
+        let side = (b - a).cross(c - a).normalize_or_zero();
+        side != Vec3::ZERO && triangle.iter().any(|&v| mesh.normals[v as usize].dot(side) < LEAST_ALONG)
+    };
+    !mesh.is_flat() && (!mesh.is_convex() || mesh.triangles.iter().any(is_bent))
+}
+
+/// What the vertices of a cluster see.
+struct ClusterSeen {
+    /// Members whose shadows their maps have.
+    near: Vec<u32>,
+    /// For each vertex the place of the one whose rays serve it too.
+    seers: Vec<usize>,
+    /// Of those that cast rays.
+    seen: Vec<Option<(Seen, Vec<Link>)>>,
+    /// The transfer vector of each, and suns of which it sees nothing, and all.
+    own: Vec<(Vec<f32>, [u32; 2])>,
 }
 
 /// Whether vertices are of different sides, as of both faces of a wall: their normals differ, or they lie apart along
@@ -1242,5 +1337,35 @@ mod tests {
         for side in sides {
             assert!(in_groove.iter().all(|nudge| nudge.dot(side) > 1e-4), "{in_groove:?} before {side}");
         }
+    }
+
+    /// A wall stands between some vertices of a floor that lie a millimetre apart.
+    #[test]
+    fn close_vertices_share_rays_unless_something_stands_between_them() {
+        let floor = [[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0], [-0.001, 0.0], [0.001, 0.0], [0.0015, 0.001]];
+        let floor = floor.map(|[x, z]| Vec3::new(x, 0.0, z)).to_vec();
+        let triangles = vec![[0, 3, 4], [4, 3, 6], [3, 2, 6], [2, 1, 5], [6, 2, 5], [1, 0, 5], [0, 4, 5], [4, 6, 5]];
+        let floor = Arc::new(Mesh::new("floor", floor, vec![Vec3::Y; 7], None, triangles).unwrap());
+        let wall = [[-1.0, 0.0], [1.0, 0.0], [1.0, 1.0], [-1.0, 1.0]].map(|[z, y]| Vec3::new(0.0, y, z)).to_vec();
+        let wall = Arc::new(Mesh::new("wall", wall, vec![Vec3::X; 4], None, vec![[0, 1, 2], [0, 2, 3]]).unwrap());
+        let mut plan = GroupPlan::alone(&floor, &Options::default(), Wanted::BOTH);
+        let stands = Member { mesh: wall, ..plan.members[0].clone() };
+        let seers = |plan: &GroupPlan| {
+            let group = Group::new(plan);
+            let space = group.space(0);
+            let nudges = space.nudges(&floor.positions, &floor.normals, &floor.triangles);
+            let inner: Vec<u32> = (0..7).filter(|&v| floor.positions[v as usize].length() < 0.1).collect();
+            let seers = space.seers(&floor, &nudges, &inner);
+            let x = |at: usize| floor.positions[inner[at] as usize].x;
+            let mut found: Vec<(f32, f32)> = (0..3).map(|at| (x(at), x(seers[at]))).collect();
+            found.sort_by(|a, b| a.0.total_cmp(&b.0));
+            found
+        };
+        let first = seers(&plan)[0].1;
+        assert!(seers(&plan).iter().all(|(_, seer)| *seer == first));
+        plan.members.push(stands);
+        let found = seers(&plan);
+        assert_eq!(found[0].1, -0.001);
+        assert!(found[1].1 > 0.0 && found[1].1 == found[2].1, "{found:?}");
     }
 }

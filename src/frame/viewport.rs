@@ -99,15 +99,16 @@ impl Frame {
                 gloss: self.drawn_gloss(entity),
                 by_pixel: self.chains.as_ref().and_then(|chains| chains.of(index)),
             };
-            let distance_m = self.centre(index, placement).distance(camera.eye) - self.radius_m(index, placement);
+            let farthest_m = self.centre(index, placement).distance(camera.eye) + self.radius_m(index, placement);
             let place = match entity.transparent {
                 true => (2, -self.box_distance_m(entity.mesh, placement, camera.eye)),
-                false => (u8::from(drawn.mesh.grid().is_some()), distance_m),
+                false => (u8::from(drawn.mesh.grid().is_some()), farthest_m),
             };
             (place.0, place.1, drawn)
         });
-        // From near to far, so that few fragments are shaded that something nearer hides later. Grids come later: a
-        // fragment of a grid costs most. What is transparent comes last, from far to near.
+        // From near to far by their far sides, so that few fragments are shaded that something nearer hides later: a room and
+        // the ground come behind what stands in them. Grids come later: a fragment of a grid costs most. What is transparent
+        // comes last, from far to near.
         let mut drawn: Vec<(u8, f64, DrawnEntity<'_>)> = drawn.collect();
         drawn.sort_by(|a, b| a.0.cmp(&b.0).then(a.1.total_cmp(&b.1)));
         drawn.into_iter().map(|(_, _, entity)| entity).collect()

@@ -394,9 +394,6 @@ impl Caster<'_> {
     /// How far each ray comes past all that the map counts; infinity where it is free.
     fn map_distances(&self, locals: &[Vec3A]) -> Vec<f32> {
         let in_map = self.counts.in_map.expect("asked for maps alone");
-        if in_map.is_empty() {
-            return vec![f32::INFINITY; locals.len()];
-        }
         let mut hits = Vec::with_capacity(locals.len());
         self.blockers.first_of(self.origin, &self.to_blockers, locals, in_map, &mut hits);
         hits.iter().map(distance).collect()
@@ -422,7 +419,7 @@ fn locals<'r>(rays: impl IntoIterator<Item = &'r PatternRay>) -> Vec<Vec3A> {
     rays.into_iter().map(|ray| ray.local).collect()
 }
 
-pub fn see(blockers: &Blockers, standing: &Standing, eye: &Eye, rays: Rays, counts: Counts<'_>) -> Seen {
+pub fn see(blockers: &Blockers, standing: &Standing, eye: &Eye, bands: usize, rays: Rays, counts: Counts<'_>) -> Seen {
     let to_object = frame(eye.normal.as_dvec3());
     let caster = Caster {
         blockers,
@@ -440,11 +437,10 @@ pub fn see(blockers: &Blockers, standing: &Standing, eye: &Eye, rays: Rays, coun
         buried: false,
         fronts: Vec::new(),
     };
+    let count = coefficient_count(bands);
     let mut add = |ray: &PatternRay, hit: &Option<BlockerHit>| {
         let Some(found) = hit else { return };
-        for k in 0..MAX_COEFFICIENTS {
-            seen.taken[k] += ray.share[k];
-        }
+        seen.taken[..count].iter_mut().zip(&ray.share[..count]).for_each(|(sum, share)| *sum += share);
         seen.blocked += ray.weight / PI;
         seen.behind += if found.from_behind { ray.weight / PI } else { 0.0 };
     };
@@ -476,7 +472,7 @@ struct CutCell {
 /// What all rays of a point have met.
 struct CellHits {
     hits: Vec<Option<BlockerHit>>,
-    /// Past what the map has; empty without a map.
+    /// Past what the map has; empty without a map, or where that is free.
     distances: Vec<f32>,
     /// First those that an edge of all that blocks crosses.
     cut: Vec<CutCell>,
@@ -503,10 +499,9 @@ impl Edge {
 impl CellHits {
     fn new(caster: &Caster<'_>) -> Self {
         let pattern = &*MANY_RAYS;
-        let with_map = caster.counts.in_map.is_some();
-        // Those above the horizon are for edges of the map.
-        let has_edges = caster.counts.in_map.is_some_and(|members| !members.is_empty());
-        let toward = locals(&pattern.rays[..if has_edges { PATTERN + HORIZON } else { PATTERN }]);
+        // A map of no members is free, and has no edges, which rays above the horizon are for.
+        let with_map = caster.counts.in_map.is_some_and(|members| !members.is_empty());
+        let toward = locals(&pattern.rays[..if with_map { PATTERN + HORIZON } else { PATTERN }]);
         let hits = caster.cast(&toward);
         let distances = if with_map { caster.map_distances_past(&toward, &hits) } else { Vec::new() };
         let at_map_edge = |cell: usize| {
@@ -669,7 +664,7 @@ mod tests {
         let eye = Eye { origin: Vec3::ZERO, normal: Vec3::Y };
         let counts = Counts { blocks: &[true; 8], in_map: with_map.then_some(&[7]), targets: &[], screens: &[] };
         let standing = Standing { rotation: DMat3::IDENTITY, radius: 1.0 };
-        see(&Blockers::new(corners.map(triangle), Vec::new(), Vec::new()), &standing, &eye, Rays::Many, counts)
+        see(&Blockers::new(corners.map(triangle), Vec::new(), Vec::new()), &standing, &eye, 4, Rays::Many, counts)
     }
 
     /// Directions all over the sphere, of equal areas: a Fibonacci lattice.
@@ -733,7 +728,7 @@ mod tests {
                 directions.iter().zip(&hits).filter(|(_, hit)| hit.is_some()).map(|(d, _)| f64::from(d.y)).sum();
             let wanted = wanted / directions.iter().map(|d| f64::from(d.y)).sum::<f64>();
             let counts = Counts { blocks: &[true], in_map: None, targets: &[], screens: &[] };
-            let found = see(&blockers, &standing, &eye, Rays::Many, counts).blocked;
+            let found = see(&blockers, &standing, &eye, 4, Rays::Many, counts).blocked;
             mean += (found / wanted - 1.0) / PLACES as f64;
             square += (found / wanted - 1.0).powi(2) / PLACES as f64;
         }
@@ -778,6 +773,7 @@ mod tests {
                 &Blockers::new(corners.iter().copied().map(triangle), Vec::new(), Vec::new()),
                 &standing,
                 &eye,
+                4,
                 Rays::Many,
                 counts,
             )

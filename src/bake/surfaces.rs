@@ -30,7 +30,7 @@ use std::sync::{Arc, OnceLock};
 use std::time::Instant;
 
 /// Counts in every name of the cache: another number where a bake of surfaces computes something else.
-const VERSION: u32 = 58;
+const VERSION: u32 = 59;
 /// How far towards the middle of its triangles a vertex is seen from, as a share of the way: the light of a crease is
 /// that just inside each face. Where meshes are left as they are, so are the places from which they are seen.
 const NUDGE: f32 = 0.02;
@@ -470,7 +470,7 @@ impl GroupPlan {
     /// `start`: vertices of what is refined, as it came.
     fn limits(&self, group: &Group<'_>, start: usize) -> Option<Limits> {
         let (vertices, moves) = self.refinement?;
-        let extent = extent(self, &group.spheres);
+        let extent = group.extent;
         let flat_area: f64 = group
             .standings
             .iter()
@@ -499,8 +499,8 @@ pub(super) struct Group<'p> {
     spheres: Vec<(DVec3, f64)>,
     /// Of each member in its own frame, metres.
     boxes: Vec<[DVec3; 2]>,
-    /// Vertices are close to each other within this.
-    alike: f32,
+    /// Its width: what stands on a ground decides what is fine, not the ground.
+    extent: f32,
     /// Where lamps light things from close by.
     targets: Vec<Target>,
     /// The plan's screens in this frame.
@@ -546,8 +546,10 @@ impl<'p> Group<'p> {
         let targets = targets(&plan.members, &spheres);
         let screens =
             plan.screens.iter().flatten().map(|corners| corners.map(|corner| (corner - centre) / radius_m)).collect();
-        let alike = ALIKE * extent(plan, &spheres);
-        Group { plan, blockers, centre, radius_m, standings, spheres, boxes, alike, targets, screens }
+        let solid: Vec<(DVec3, f64)> =
+            spheres.iter().zip(&plan.members).filter(|(_, m)| !m.mesh.is_flat()).map(|(s, _)| *s).collect();
+        let extent = around_spheres(&solid).map_or(2.0, |(_, radius)| 2.0 * radius) as f32;
+        Group { plan, blockers, centre, radius_m, standings, spheres, boxes, extent, targets, screens }
     }
 
     /// A place of the world in the group's frame.
@@ -566,14 +568,6 @@ impl<'p> Group<'p> {
         let others = (0..).zip(&blocks).map(|(i, blocks)| i != member && *blocks).collect();
         GroupSpace { group: self, member, blocks, others }
     }
-}
-
-/// Width of a group, in its frame: what stands on a ground decides what is fine, not the ground. `spheres` are those of all
-/// members.
-fn extent(plan: &GroupPlan, spheres: &[(DVec3, f64)]) -> f32 {
-    let solid: Vec<(DVec3, f64)> =
-        spheres.iter().zip(&plan.members).filter(|(_, m)| !m.mesh.is_flat()).map(|(s, _)| *s).collect();
-    around_spheres(&solid).map_or(2.0, |(_, radius)| 2.0 * radius) as f32
 }
 
 /// Spheres around the members that a lamp of the group lights from close by. `spheres` are those of all
@@ -677,7 +671,7 @@ impl GroupSpace<'_> {
         let eye = Eye { origin: self.placed(position + nudge).into(), normal };
         let standing = &group.standings[self.member];
         let counts = Counts { blocks: &self.blocks, in_map, targets: &group.targets, screens: &group.screens };
-        let mut seen = see(&group.blockers, standing, &eye, rays, counts);
+        let mut seen = see(&group.blockers, standing, &eye, group.plan.bands, rays, counts);
         seen.from = position + nudge;
         let is_covered = self.is_covered(position, normal, nudge);
         if is_covered {
@@ -696,7 +690,7 @@ impl GroupSpace<'_> {
     /// between them: its rays serve both.
     fn seers(&self, mesh: &Mesh, nudges: &[Vec3], cluster: &[u32]) -> Vec<usize> {
         let place = |v: usize| mesh.positions[v] + nudges[v];
-        let near = (self.group.alike / self.scale()).min(ALIKE_MESH * mesh.bounding_sphere().1);
+        let near = (ALIKE * self.group.extent / self.scale()).min(ALIKE_MESH * mesh.bounding_sphere().1);
         let mut seers: Vec<usize> = Vec::with_capacity(cluster.len());
         for (at, v) in cluster.iter().map(|v| *v as usize).enumerate() {
             let frame_here = frame(mesh.normals[v].as_dvec3());
@@ -952,54 +946,46 @@ impl GroupSpace<'_> {
                     });
                     (seen, links(met.collect(), runs))
                 };
-                let mut seers = self.seers(&mesh, nudges, cluster);
+                let seers = self.seers(&mesh, nudges, cluster);
+                let place = |at: usize| mesh.positions[cluster[at] as usize] + nudges[cluster[at] as usize];
+                let cast = |at: usize| Arc::new(linked(at));
                 let each = (0..cluster.len()).into_par_iter().with_max_len(8);
-                let mut seen: Vec<Option<(Seen, Vec<Link>)>> =
-                    each.clone().map(|at| (seers[at] == at).then(|| linked(at))).collect();
+                let first: Vec<Option<Arc<(Seen, Vec<Link>)>>> =
+                    each.clone().map(|at| (seers[at] == at).then(|| cast(at))).collect();
                 // What lies below something, or was seen from beside it, tells nothing of its neighbours.
-                let serves = |at: usize| {
-                    let v = cluster[at] as usize;
-                    let here = |seen: &Seen| !seen.buried && seen.from == mesh.positions[v] + nudges[v];
-                    seen[at].as_ref().is_some_and(|(seen, _)| here(seen))
+                let of_other = |at: usize| {
+                    let rays = first[seers[at]].as_ref().filter(|_| seers[at] != at)?;
+                    (!rays.0.buried && rays.0.from == place(seers[at])).then(|| rays.clone())
                 };
-                let alone: Vec<usize> =
-                    (0..cluster.len()).filter(|&at| seers[at] != at && !serves(seers[at])).collect();
-                let found: Vec<(Seen, Vec<Link>)> = alone.par_iter().map(|&at| linked(at)).collect();
-                for (at, found) in alone.into_iter().zip(found) {
-                    seers[at] = at;
-                    seen[at] = Some(found);
-                }
-                // Suns have sharp edges, which each vertex finds by itself.
-                let own = |at: usize| {
-                    let v = cluster[at] as usize;
-                    let seer = cluster[seers[at]] as usize;
-                    let (seen, _) = seen[seers[at]].as_ref().expect("of a vertex that casts rays");
-                    let aside = mesh.positions[v] + nudges[v] - mesh.positions[seer] - nudges[seer];
-                    let suns = self.seen_suns(seen.from + aside, mesh.normals[v]);
-                    (self.transfer(seen, mesh.normals[v]), suns)
+                let every = |at: usize| {
+                    let other = of_other(at);
+                    let is_served = other.is_some();
+                    let rays = other.or_else(|| first[at].clone()).unwrap_or_else(|| cast(at));
+                    let from = if is_served { place(at) } else { rays.0.from };
+                    let normal = mesh.normals[cluster[at] as usize];
+                    // Suns have sharp edges, which each vertex finds by itself.
+                    SeenVertex { transfer: self.transfer(&rays.0, normal), suns: self.seen_suns(from, normal), rays }
                 };
-                let own = each.map(own).collect();
-                ClusterSeen { near, seers, seen, own }
+                (near, each.map(every).collect())
             };
-            let found: Vec<ClusterSeen> = batch.par_iter().map(look).collect();
-            for (cluster, found) in batch.iter().zip(found) {
-                for (at, &v) in cluster.iter().enumerate() {
-                    let (seen, links) = found.seen[found.seers[at]].as_ref().expect("of a vertex that casts rays");
-                    let (own_transfer, own_suns) = &found.own[at];
+            let found: Vec<(Vec<u32>, Vec<SeenVertex>)> = batch.par_iter().map(look).collect();
+            for (cluster, (members, vertices)) in batch.iter().zip(found) {
+                for (&v, vertex) in cluster.iter().zip(vertices) {
+                    let (seen, links) = &*vertex.rays;
                     linked.counts.push(links.len() as u8);
                     linked.packed.extend(links.iter().map(|link| link.packed));
                     if !plan.screens.is_empty() {
                         linked.directions.extend(links.iter().map(|link| link.direction));
                     }
-                    suns[v as usize] = *own_suns;
+                    suns[v as usize] = vertex.suns;
                     any_blocked |= seen.blocked > 0.0;
-                    transfer[v as usize * stride..][..stride].copy_from_slice(own_transfer);
+                    transfer[v as usize * stride..][..stride].copy_from_slice(&vertex.transfer);
                     if has_maps {
                         maps[v as usize * BYTES..][..BYTES].copy_from_slice(&seen.map);
                     }
                 }
-                any_in_map |= found.near.iter().any(is_in_map);
-                near.push(found.near);
+                any_in_map |= members.iter().any(is_in_map);
+                near.push(members);
                 done += cluster.len();
             }
             told(done);
@@ -1027,16 +1013,13 @@ fn shades_itself(mesh: &Mesh) -> bool {
     !mesh.is_flat() && (!mesh.is_convex() || mesh.triangles.iter().any(is_bent))
 }
 
-/// What the vertices of a cluster see.
-struct ClusterSeen {
-    /// Members whose shadows their maps have.
-    near: Vec<u32>,
-    /// For each vertex the place of the one whose rays serve it too.
-    seers: Vec<usize>,
-    /// Of those that cast rays.
-    seen: Vec<Option<(Seen, Vec<Link>)>>,
-    /// The transfer vector of each, and suns of which it sees nothing, and all.
-    own: Vec<(Vec<f32>, [u32; 2])>,
+/// What a vertex of a cluster sees.
+struct SeenVertex {
+    /// Its own rays and links, or those of a vertex that stands and faces as it does.
+    rays: Arc<(Seen, Vec<Link>)>,
+    transfer: Vec<f32>,
+    /// A bit for each sun of which nothing can be seen, and all.
+    suns: [u32; 2],
 }
 
 /// Whether vertices are of different sides, as of both faces of a wall: their normals differ, or they lie apart along

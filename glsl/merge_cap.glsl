@@ -12,17 +12,13 @@ float field_share(Cone cone) {
 }
 
 #if SKIP_CAPS
+#include "area.glsl"
+
 // The point occluder: its solid angle and, in the world, the basis in its direction. Cut to a few bands, a disc of mean
 // square radius q (radians) has 1 - l (l + 1) q / 4 of what a point has in band l.
 float cap_of(Entity entity, Cone cone, out float y[COEFFICIENTS]) {
-    float u = dot(entity.area_x.xyz, cone.toward);
-    float v = dot(entity.area_y.xyz, cone.toward);
-    u *= u;
-    v *= v;
-    vec4 terms = entity.area_terms;
-    float area = entity.area_x.w + u * (entity.area_y.w + terms.y * u + terms.w * v) + v * (terms.x + terms.z * v);
     float square = cone.sine * cone.sine;
-    float covered = max(area, 0.0) * square;
+    float covered = area_share(entity, cone.toward) * square;
     sh_basis(cone.toward, y);
     float quarter = 0.25 * CAP_SPREAD * covered;
     // One loop, not one in another, which Mesa does not unroll.

@@ -1,6 +1,9 @@
 // Light that a surface receives from sharp lights, past what is listed before each of them. The twin is
 // src/sharp/twin.rs.
 #include "sub_light.glsl"
+#if OUTLINES
+#include "area.glsl"
+#endif
 
 // SwiftShader takes minutes and gigabytes to compile what others need unrolled.
 #if ROLLED
@@ -499,23 +502,64 @@ bool may_block(uint packed, Surface surface, SeenLight light, float radius) {
     return meets;
 }
 
+#if BOXES || HALVES || CUBOIDS
+// Whether the same cone comes near the box around the occluder, which for most is much narrower than their ball. All that
+// is neither an outline nor a box may be met.
+bool may_cross(uint packed, Surface surface, SeenLight light, float radius) {
+    Entity occluder = ENTITY(packed & SKY_CHAIN);
+    vec3 place = surface.position - (occluder.centre.xyz - surface.origin);
+    place = to_object(occluder, place) * occluder.centre.w;
+    vec3 toward = to_object(occluder, light.toward);
+    float margin = NEAREST;
+#if EDGES
+    margin += max(1.0, EDGE_REACH) * surface.step * occluder.centre.w;
+#endif
+    float sine = min(CONE_WIDER * light.sine, MOST_SINE);
+    float limit = (light.distance + radius) * occluder.centre.w;
+    float reach = clamp(BALL_WIDER + margin - dot(place, toward), 0.0, limit);
+    margin += reach * sine * inversesqrt(1.0 - sine * sine);
+    uint first = occluder.silhouette & ~HAS_HALVES;
+    vec3 low = node_quad(first).xyz, high = node_quad(first + 1).xyz;
+    float blur = BALL_WIDER - 1.0;
+    bool is_box = is_kind(packed, ENTRY_CUBOID);
+#if CUBOIDS
+    vec3 third = node_quad(first + 2).xyz;
+    vec3 halves = vec3(length(low), length(high), length(third));
+    mat3 axes = is_box ? mat3(low / halves.x, high / halves.y, third / halves.z) : mat3(1.0);
+    place = place * axes;
+    toward = toward * axes;
+    low = is_box ? -halves : low;
+    high = is_box ? halves : high;
+    blur = is_box ? 0.0 : blur;
+#endif
+    vec2 ends = slabs(low - margin - blur - place, high + margin + blur - place, toward);
+    return ends.x <= ends.y && ends.y > 0.0 && ends.x < limit || !has_outline(packed) && !is_box;
+}
+#endif
+
 // The first entry of a chain from `i` on that has to be evaluated: an occluder that may block, or the light at `end`.
 // Values of this loop are read again behind it: on lavapipe a lane that leaves a loop early may lose what the loop does
 // not carry.
 uint next_entry(Surface surface, SeenLight light, float radius, uint i, uint end) {
     bool passes = false;
     do {
-#if BLENDS
-        // Few are marked.
-        i = near_occluders == 0 ? end : i;
-        bool unmarked = false;
         do {
-            unmarked = i < end && (near_occluders & occluder_bit(entry_at(i))) == 0;
-            i += unmarked ? 1 : 0;
-        } while (unmarked);
+#if BLENDS
+            // Few are marked.
+            i = near_occluders == 0 ? end : i;
+            bool unmarked = false;
+            do {
+                unmarked = i < end && (near_occluders & occluder_bit(entry_at(i))) == 0;
+                i += unmarked ? 1 : 0;
+            } while (unmarked);
 #endif
-        passes = i < end && !may_block(entry_at(i), surface, light, radius);
+            passes = i < end && !may_block(entry_at(i), surface, light, radius);
+            i += passes ? 1 : 0;
+        } while (passes);
+#if BOXES || HALVES || CUBOIDS
+        passes = i < end && !may_cross(entry_at(i), surface, light, radius);
         i += passes ? 1 : 0;
+#endif
     } while (passes);
     return i;
 }
@@ -564,23 +608,34 @@ vec3 chain_sum(Surface surface, uint i, uint end) {
     // Of a light below the horizon, or that its own mesh hides, nothing is left to block.
     i = unblocked > 0.0 ? next_entry(surface, light, radius, i, end) : end;
     uint packed = entry_at(i);
-    b = first_block;
+    bool own = false; // whether it is the light's own outline that is looked up, not an occluder's
+#if OUTLINES
+    // As much of each part shines as the outline covers, and from afar as the light's area.
+    own = shining.light_kind == LIGHT_OUTLINE && last_block > 0;
+    float far_share = shining.light_kind == LIGHT_OUTLINE ? area_share(shining, light.toward) : 1.0;
+    set_block(shares, 0, far_share * of_block(shares, 0));
+#endif
+    b = own ? 1 : first_block;
     do {
-        if (has_outline(packed)) {
+        if (own || has_outline(packed)) {
 #if EDGES
             finest = 0.0;
 #endif
-            vec4 free = let_through(ENTITY(packed & SKY_CHAIN), surface, light, block_of(light, b), true);
-            set_block(shares, b, free * of_block(shares, b));
+            uint occluder = own ? chain_light(entry_at(end)) : packed & SKY_CHAIN;
+            vec4 free = let_through(ENTITY(occluder), surface, light, block_of(light, b), !own);
+            set_block(shares, b, (own ? 1.0 - free : free) * of_block(shares, b));
 #if EDGES
-            note_occluder(packed, free, b, covered, nearest);
+            if (!own) {
+                note_occluder(packed, free, b, covered, nearest);
+            }
 #endif
             bool last = b == last_block;
             b = last ? first_block : b + 1;
-            i = last ? next_entry(surface, light, radius, i + 1, end) : i;
+            i = last && !own ? next_entry(surface, light, radius, i + 1, end) : i;
+            own = own && !last;
             packed = entry_at(i);
         }
-    } while (has_outline(packed));
+    } while (own || has_outline(packed));
 #if SHEETS
     // All sheets before one block are put together first.
     uint sheets = i;
@@ -653,17 +708,6 @@ vec3 chain_sum(Surface surface, uint i, uint end) {
         passed += dot(of_block(shares, b), vec4(1.0));
         b++;
     } while (b <= last_block);
-#endif
-#if OUTLINES
-    // Of a light with an outline of its own, as much of each part shines as the outline covers.
-    b = first_block;
-    do {
-        if (shining.light_kind == LIGHT_OUTLINE) {
-            vec4 dark = let_through(shining, surface, light, block_of(light, b), false);
-            set_block(shares, b, (1.0 - dark) * of_block(shares, b));
-            b++;
-        }
-    } while (shining.light_kind == LIGHT_OUTLINE && b <= last_block);
 #endif
     float irradiance = 0.0;
 #if COLORS

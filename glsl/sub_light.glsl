@@ -54,15 +54,16 @@ SeenLight seen_light(vec3 to, Entity shining) {
     vec3 across = cross(light.toward, vec3(TURNED_X, TURNED_Y, TURNED_Z));
     light.across = across / max(length(across), 1e-30);
     light.down = cross(light.toward, light.across);
-    light.fine = clamp((light.sine / LIMIT_SINE - 1.0) / (BLEND - 1.0), 0.0, 1.0);
+    float limit = LIMIT_SINE;
 #if OUTLINES
-    // Four parts do not carry the outline of a mesh.
-    light.fine = shining.light_kind == LIGHT_OUTLINE ? 1.0 : light.fine;
-#if BOXES
+    // Four parts do not carry the outline of a mesh, but from afar its projected area tells its light.
+    limit = shining.light_kind == LIGHT_OUTLINE ? LIMIT_OUTLINE : limit;
+#endif
+    light.fine = clamp((light.sine / limit - 1.0) / (BLEND - 1.0), 0.0, 1.0);
+#if OUTLINES && BOXES
     light.to_box = mat3(to_object(shining, light.toward), to_object(shining, light.across), to_object(shining, light.down));
     light.box[0] = vec3(0.0);
     light.box[1] = vec3(0.0);
-#endif
 #endif
 #if PANELS
     light.kind = shining.light_kind;

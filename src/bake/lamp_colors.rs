@@ -6,7 +6,6 @@ use crate::asset::Mesh;
 use crate::field::lamp_colors::{ColorPlane, LampColors, SHELL_STEP, SHELLS};
 use crate::field::silhouette::SilhouetteField;
 use crate::field::silhouette_nodes::NodeGrid;
-use crate::field::sub_light::SeenLight;
 use glam::{DMat3, DVec2, DVec3, DVec4, Mat3A, Vec3, Vec3A};
 use rayon::prelude::*;
 
@@ -47,7 +46,7 @@ impl LampColors {
             let seen = |toward: DVec3| {
                 let mut view = view(mesh, &blockers, toward, sine);
                 if let Some(silhouette) = silhouette.filter(|_| view.count >= ENOUGH) {
-                    let factor = (view.share / covered(silhouette, toward, sine).max(0.01)).clamp(0.5, 2.0);
+                    let factor = (view.share / silhouette.covered(toward, sine).max(0.01)).clamp(0.5, 2.0);
                     view.plane = view.plane.map(|quad| factor * quad);
                 }
                 view
@@ -107,21 +106,6 @@ fn view(mesh: &Mesh, blockers: &Blockers, toward: DVec3, sine: f64) -> View {
     let count = met.len() as f64;
     let plane = fitted(&met).map(|fit| (fit.x * across + fit.y * down).extend(fit.z));
     View { count, share: count / places.len() as f64, sum, plane }
-}
-
-/// Share of the disc that the light's parts take an outline to cover.
-fn covered(silhouette: &SilhouetteField, toward: DVec3, sine: f64) -> f64 {
-    let light = SeenLight::outlined(toward / sine, 1.0);
-    let mut covered = 0.0;
-    let mut whole = 0.0;
-    for (middle, parts) in light.blocks() {
-        let near = silhouette.near(-toward / sine, middle);
-        for part in parts {
-            covered += part.weight * silhouette.blocked(&near, part.toward, f64::INFINITY, part.tangent());
-            whole += part.weight;
-        }
-    }
-    covered / whole
 }
 
 /// The planes through colours over places (x, y, 1), by least squares: slopes and constant of each channel.

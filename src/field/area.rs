@@ -1,5 +1,5 @@
-//! Projected area of an object by direction, as a polynomial. It is fitted to the outermost shell of the object's
-//! field, so that values computed from the area agree there with values looked up in the field.
+//! Projected area of an object by direction, as a polynomial. It is fitted to what stands for the object near by, so that
+//! nothing changes where the area takes over: the outermost shell of its field, or of a light its outline.
 
 use super::ShadowField;
 use super::lattice::cap_height;
@@ -25,15 +25,17 @@ impl Area {
     /// Fits the area to the outermost shell of an occlusion field.
     pub fn new(field: &ShadowField) -> Self {
         let outer = field.header.lattice.outer;
-        let mut found = [0.0; MAX_COEFFICIENTS];
-        let samples: Vec<(DVec3, f64, f64)> = sphere_rule(12)
-            .into_iter()
-            .map(|(direction, weight)| {
-                field.lookup(outer * direction, 0, &mut found);
-                (direction, weight, found[0] / (Y00 * 2.0 * PI * cap_height(outer)))
-            })
-            .collect();
-        Self::fit(&samples)
+        Self::of(|direction| {
+            let mut found = [0.0; MAX_COEFFICIENTS];
+            field.lookup(outer * direction, 0, &mut found);
+            found[0] / (Y00 * 2.0 * PI * cap_height(outer))
+        })
+    }
+
+    /// Fits what an object fills of its bounding sphere's disc, seen from a unit direction of its frame.
+    pub fn of(filled: impl Fn(DVec3) -> f64) -> Self {
+        let sample = |(direction, weight)| (direction, weight, filled(direction));
+        Self::fit(&sphere_rule(12).into_iter().map(sample).collect::<Vec<_>>())
     }
 
     fn fit(samples: &[(DVec3, f64, f64)]) -> Self {

@@ -23,9 +23,11 @@
 //! where the object stands. Receivers within a slab's sphere have errors of 0.05 with it and of 0.19 without; on the roof
 //! that lies on a gable they have a false shadow where the box alone tells.
 
+use super::Area;
 use super::file;
 pub use super::silhouette_header::{FACES_LIMIT, Side, SilhouetteHeader};
 use super::silhouette_nodes::{Cell, NodeGrid};
+use super::sub_light::{LIMIT_OUTLINE, SeenLight};
 use crate::error::{Error, Result};
 use glam::{DVec2, DVec3};
 use std::f64::consts::PI;
@@ -323,6 +325,27 @@ impl SilhouetteField {
         let [low, high] = self.header.extent.map(|corner| DVec3::from_array(corner.map(f64::from)));
         let tells = low.max(-high).max_element() > -ROUND;
         if tells { [low, high] } else { [DVec3::splat(-NO_BOX), DVec3::splat(NO_BOX)] }
+    }
+
+    /// Share of the disc of a light with this outline that its parts cover, from the direction of its centre and its angular
+    /// radius' sine.
+    pub fn covered(&self, toward: DVec3, sine: f64) -> f64 {
+        let light = SeenLight::new(toward / sine, 1.0).in_quarters();
+        let mut covered = 0.0;
+        let mut whole = 0.0;
+        for (middle, parts) in light.blocks() {
+            let near = self.near(-toward / sine, middle);
+            for part in parts {
+                covered += part.weight * self.blocked(&near, part.toward, f64::INFINITY, part.tangent());
+                whole += part.weight;
+            }
+        }
+        covered / whole
+    }
+
+    /// The area of a light with this outline from afar.
+    pub fn area(&self) -> Area {
+        Area::of(|direction| self.covered(-direction, LIMIT_OUTLINE))
     }
 
     /// Whether box or faces tell what neither the outline nor halves do.

@@ -17,6 +17,8 @@ pub const MOST_SINE: f64 = 0.9999;
 pub const BLOCK: usize = 4;
 /// Sine of the angular radius up to which a light is one block: 12 degrees. Larger lights are four.
 pub const LIMIT_SINE: f64 = 0.207_911_690_817_759_34;
+/// The same of a light with an outline of its own: 4 degrees.
+pub const LIMIT_OUTLINE: f64 = 0.07;
 /// A light whose sine lies this much above the limit has four blocks alone; between, one block and four by shares.
 pub const BLEND: f64 = 1.25;
 /// Distance of the corners of a square from its middle, on a disc of radius 1: with the square of a part's own radius
@@ -125,9 +127,9 @@ impl Block {
     }
 }
 
-/// Share of the four blocks in a light whose angular radius has that sine.
-pub fn fine_share(sine: f64) -> f64 {
-    ((sine / LIMIT_SINE - 1.0) / (BLEND - 1.0)).clamp(0.0, 1.0)
+/// Share of the four blocks in a light whose angular radius has that sine, beside the sine up to which it has none.
+pub fn fine_share(sine: f64, limit: f64) -> f64 {
+    ((sine / limit - 1.0) / (BLEND - 1.0)).clamp(0.0, 1.0)
 }
 
 /// A direction that the squares of parts are turned by: at right angles to it and to the light stands their first axis.
@@ -186,16 +188,23 @@ impl SeenLight {
             toward: to.normalize_or(DVec3::Y),
             distance,
             sine,
-            fine: fine_share(sine),
+            fine: fine_share(sine, LIMIT_SINE),
             panel: None,
             boxed: None,
         }
     }
 
-    /// The light with an outline of its own, which is always four blocks: four parts err by 0.07 of the light of a
-    /// torus and by 0.10 of a teapot's, sixteen by 0.02 and 0.04, without factors ([`super::lamp_colors`]).
+    /// The light with an outline of its own, which decides how much of its sixteen parts shines. Four parts err by 0.07 of
+    /// the light of a torus and by 0.10 of a teapot's, sixteen by 0.02 and 0.04, without factors ([`super::lamp_colors`]);
+    /// so from afar, where it is one block, that is as much as the outline's area ([`super::Area`]).
     pub fn outlined(to: DVec3, radius: f64) -> Self {
-        SeenLight { fine: 1.0, ..Self::new(to, radius) }
+        let seen = Self::new(to, radius);
+        SeenLight { fine: fine_share(seen.sine, LIMIT_OUTLINE), ..seen }
+    }
+
+    /// The light as four blocks, however small it is.
+    pub fn in_quarters(self) -> Self {
+        SeenLight { fine: 1.0, ..self }
     }
 
     /// The same with a box around it, turned by `rotation`: a flat body lies behind most of its bounding sphere.
@@ -424,7 +433,7 @@ mod tests {
     fn weights_add_up_and_change_without_a_step() {
         let mut before = [0.0; 2];
         for i in 0..=10_000 {
-            let blocks = blocks(fine_share(f64::from(i) * 1e-4), &Pattern::DISC);
+            let blocks = blocks(fine_share(f64::from(i) * 1e-4, LIMIT_SINE), &Pattern::DISC);
             let of =
                 |scale: f64| blocks.iter().filter(|b| b.scale == scale).map(|b| 4.0 * b.area * b.weight).sum::<f64>();
             let now = [of(1.0), of(0.5)];

@@ -165,6 +165,8 @@ impl Frame {
             [slope as f32, offset as f32, lattice.inner as f32, lattice.outer as f32]
         });
         let area = device_mesh.blocked.as_ref().map_or(Area::default(), |slot| slot.area);
+        let lamp_area = device_mesh.slots.lamp_area.filter(|_| is_sharp && method == LightMethod::Outline);
+        let area = lamp_area.unwrap_or(area);
         let sheet = self.sheet(index, placement).map(|sheet| sheet.rectangle);
         let axes = sheet.map_or(area.axes.map(|axis| rotation * axis), |rectangle| rectangle.axes);
         let [area_x, area_y] = axes.map(|axis| axis.as_vec3());

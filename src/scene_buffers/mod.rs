@@ -167,7 +167,8 @@ impl SceneBuffers {
         let FieldAtlas { fields, slots, volume_first } =
             field_atlas::field_atlas(device, scene, &baked.meshes, volume, options)?;
         let casters: Vec<_> = (0..scene.meshes.len()).map(|mesh| scene.caster(mesh)).collect();
-        let (silhouettes, mesh_slots) = Silhouettes::new(device, &baked.meshes, &casters)?;
+        let shines = |mesh: usize| scene.entities.iter().any(|entity| entity.mesh == mesh && entity.emits);
+        let (silhouettes, mesh_slots) = Silhouettes::new(device, &baked.meshes, &casters, shines)?;
         let meshes = casters.into_iter().zip(slots).zip(mesh_slots).map(|((caster, [blocked, radiance]), slots)| {
             let (centre, radius_m) = caster.bounding_sphere();
             DeviceMesh {

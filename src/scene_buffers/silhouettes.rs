@@ -4,6 +4,7 @@ use super::ALIGNMENT;
 use crate::asset::Mesh;
 use crate::bake::BakedMesh;
 use crate::error::Result;
+use crate::field::Area;
 use crate::field::cuboid::{Cuboid, PlacedCuboid};
 use crate::field::lamp_colors::LampColors;
 use crate::field::silhouette::SilhouetteField;
@@ -33,6 +34,8 @@ pub struct Slot<T> {
 pub struct MeshSlots {
     /// Silhouette field, if an entity needs one.
     pub silhouette: Option<Slot<Arc<SilhouetteField>>>,
+    /// Its area from afar, if it shines by its outline.
+    pub lamp_area: Option<Area>,
     /// The box that it is, if it is one.
     pub cuboid: Option<Slot<Cuboid>>,
     /// Where each of the boxes begins that it consists of.
@@ -43,8 +46,13 @@ pub struct MeshSlots {
 
 impl Silhouettes {
     /// Uploads the fields of a scene's meshes and the boxes that `casters` are or consist of, and returns each mesh's
-    /// place. Meshes that share a field share its place.
-    pub fn new(device: &Arc<Device>, baked: &[BakedMesh], casters: &[&Arc<Mesh>]) -> Result<(Self, Vec<MeshSlots>)> {
+    /// place. Meshes that share a field share its place. `shines` tells of which meshes outlines shine.
+    pub fn new(
+        device: &Arc<Device>,
+        baked: &[BakedMesh],
+        casters: &[&Arc<Mesh>],
+        shines: impl Fn(usize) -> bool,
+    ) -> Result<(Self, Vec<MeshSlots>)> {
         let mut nodes = Vec::<[f32; 4]>::new();
         let mut cells = Vec::<[u32; 2]>::new();
         let mut known = HashMap::<*const SilhouetteField, u32>::new();
@@ -81,9 +89,12 @@ impl Silhouettes {
         };
         let colors = baked.iter().map(|mesh| mesh.lamp_colors.as_ref().map(&mut colors_slot));
         let slots = silhouettes.into_iter().zip(boxes).zip(colors);
-        let slots = slots
-            .map(|((silhouette, (cuboid, boxes)), lamp_colors)| MeshSlots { silhouette, cuboid, boxes, lamp_colors })
-            .collect();
+        let of_mesh = |(mesh, ((silhouette, (cuboid, boxes)), lamp_colors))| {
+            let lamp: Option<&Slot<Arc<SilhouetteField>>> = Option::as_ref(&silhouette).filter(|_| shines(mesh));
+            let lamp_area = lamp.map(|slot| slot.content.area());
+            MeshSlots { silhouette, lamp_area, cuboid, boxes, lamp_colors }
+        };
+        let slots = slots.enumerate().map(of_mesh).collect();
         nodes.resize(nodes.len().max(ALIGNMENT as usize / 16), [0.0; 4]);
         cells.resize(cells.len().max(ALIGNMENT as usize / 8), [0; 2]);
         let nodes = Buffer::with_data(device, "silhouette nodes", &nodes)?;

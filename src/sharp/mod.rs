@@ -15,7 +15,9 @@ use crate::field::lattice::CELL_WARP;
 use crate::field::sheet::{BEYOND as BEYOND_SHEET, CONTACT};
 use crate::field::silhouette::{DEEP, HALF_DEPTH, INSIDE, REACH};
 use crate::field::silhouette_nodes::{BEYOND, EASED, LEAST_AHEAD};
-use crate::field::sub_light::{BLEND, CORNER, LIMIT_SINE, MOST_SINE, NEAR_LIGHT_STEPS, STRIP, THIN, TURNED_BY};
+use crate::field::sub_light::{
+    BLEND, CORNER, LIMIT_OUTLINE, LIMIT_SINE, MOST_SINE, NEAR_LIGHT_STEPS, STRIP, THIN, TURNED_BY,
+};
 use crate::gpu::{Bind, Buffer, Commands, ComputePipeline, Device, TexelView};
 use crate::layout::{CLUSTER_FORMAT, CLUSTER_VERTICES, ENTRY_BITS, ENTRY_FORMAT, SHOWN_LIGHTS};
 use crate::merge::variant::Reads;
@@ -167,6 +169,7 @@ impl SharpPermutation {
             ("NEAR_LIGHT", (NEAR_LIGHT_STEPS / EDGE_STEPS).powi(2)),
             ("MOST_SINE", MOST_SINE),
             ("LIMIT_SINE", LIMIT_SINE),
+            ("LIMIT_OUTLINE", LIMIT_OUTLINE),
             ("BLEND", BLEND),
             ("CORNER", CORNER),
             ("STRIP", STRIP),

@@ -1,5 +1,6 @@
 //! The CPU twin of "sharp", in f64 and vertex by vertex, from the same stored numbers.
 
+use crate::field::Area;
 use crate::field::cuboid::Cuboid;
 use crate::field::lamp_colors::{LampColors, color_at};
 use crate::field::self_visibility::{self, BYTES};
@@ -20,6 +21,8 @@ pub struct SharpObject<'f> {
     /// Bounding radius after scaling, metres.
     pub radius_m: f64,
     pub silhouette: Option<&'f SilhouetteField>,
+    /// Its area from afar, if it shines by its outline.
+    pub lamp_area: Option<Area>,
     /// The box that blocks in place of an outline.
     pub cuboid: Option<Cuboid>,
     /// The rectangle that blocks in place of an outline.
@@ -133,8 +136,12 @@ impl SharpTwin<'_> {
             let aside = (part.toward - part.toward.dot(seen.toward) * seen.toward) / seen.sine;
             *mean * color_at(plane, shining.rotation.inverse() * aside)
         };
-        let block = |(toward, parts): (DVec3, [LightPart; BLOCK])| -> DVec3 {
+        let block = |(number, (toward, parts)): (usize, (DVec3, [LightPart; BLOCK]))| -> DVec3 {
             let between: Vec<Near> = occluders.iter().map(|object| near(object, toward)).collect();
+            // From afar the light is one block, which its area covers.
+            let is_whole = number == 0 && seen.fine < 1.0;
+            let area = shining.lamp_area.filter(|_| share.is_none() && is_whole);
+            let share = share.or(area.map(|area| area.at(shining.rotation.inverse() * seen.toward)));
             let own = share.is_none().then(|| near(shining, toward));
             let part = |part: &LightPart| {
                 let pairs = occluders.iter().zip(&between);
@@ -174,6 +181,6 @@ impl SharpTwin<'_> {
             };
             parts.iter().map(part).sum()
         };
-        past_globes * seen.over_parts(point.normal) * seen.blocks().into_iter().map(block).sum::<DVec3>()
+        past_globes * seen.over_parts(point.normal) * seen.blocks().into_iter().enumerate().map(block).sum::<DVec3>()
     }
 }

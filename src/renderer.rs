@@ -187,7 +187,7 @@ impl Renderer {
         let bands = self.frame.buffers.bands;
         let known = scene.entities.get(entity);
         let mesh = known.ok_or_else(|| Error::Input(format!("there is no entity {entity}")))?.mesh;
-        if let Some((floats, stride)) = self.frame.buffers.transfer(self.frame.buffers.surface(entity))? {
+        if let Some((floats, stride)) = self.frame.buffers.baked_transfer(self.frame.buffers.surface(entity))? {
             debug_assert_eq!(stride, channel_stride(bands));
             let vectors = floats.chunks_exact(stride).flat_map(|vector| &vector[..bands * bands]);
             return Ok(Transfer { bands, coefficients: vectors.copied().collect() });

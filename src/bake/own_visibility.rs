@@ -15,6 +15,7 @@ use crate::field::self_visibility::{
     BYTES, LIMIT_RAD, NODES, encode_angle, encode_distance, frame, node_direction, octahedral,
 };
 use crate::field::silhouette::through_box;
+use crate::field::sky_view::{self, cell};
 use crate::sh::basis::{MAX_BANDS, MAX_COEFFICIENTS, coefficient_count, values};
 use crate::sh::lobe::clamped_cosine;
 use crate::sh::rotation::Rotation;
@@ -248,6 +249,8 @@ pub struct Seen {
     /// Whether no light comes here.
     is_covered: bool,
     pub map: Vec<u8>,
+    /// Free shares of the view by cells of the sky, where they are asked for ([`sky_view::pack`]).
+    pub sky: Vec<[u8; 2]>,
     /// Share of the cosine-weighted hemisphere that is blocked.
     pub blocked: f64,
     /// Share that is blocked by backs of triangles.
@@ -293,6 +296,7 @@ impl Seen {
     pub fn cover(&mut self) {
         self.is_covered = true;
         self.fronts.clear();
+        self.sky.clear();
         self.blocked = 1.0;
         if let Some((angles, distances)) = self.map.split_at_mut_checked(NODES) {
             angles.fill(encode_angle(-LIMIT_RAD));
@@ -307,6 +311,8 @@ pub struct Counts<'c> {
     pub blocks: &'c [bool],
     /// Members whose shadows the map has, of those that block; `None` for no map.
     pub in_map: Option<&'c [u32]>,
+    /// Whether it matters which parts of the sky are free.
+    pub sky: bool,
     pub targets: &'c [Target],
     /// Boxes in the blockers' frame, their least and largest corners, in which something moves that hides what lies beyond.
     pub screens: &'c [[DVec3; 2]],
@@ -432,6 +438,7 @@ pub fn see(blockers: &Blockers, standing: &Standing, eye: &Eye, bands: usize, ra
         taken: [0.0; MAX_COEFFICIENTS],
         is_covered: false,
         map: Vec::new(),
+        sky: Vec::new(),
         blocked: 0.0,
         behind: 0.0,
         buried: false,
@@ -449,10 +456,15 @@ pub fn see(blockers: &Blockers, standing: &Standing, eye: &Eye, bands: usize, ra
         Rays::Many => {
             let found = CellHits::new(&caster);
             let mut fronts = Vec::with_capacity(PATTERN);
+            let mut free = [0.0; sky_view::CELLS];
             found.each(|ray, hit| {
                 add(ray, hit);
                 fronts.extend(caster.front(ray.local, ray.weight, hit));
+                if counts.sky && hit.is_none() {
+                    free[cell(caster.to_blockers * ray.local)] += (ray.weight / PI) as f32;
+                }
             });
+            seen.sky = sky_view::pack(&free);
             caster.aim(&mut fronts);
             seen.fronts = fronts;
             if counts.in_map.is_some() {
@@ -662,7 +674,8 @@ mod tests {
         let ball = generate::sphere(1.0, 5);
         let corners = ball.triangles.iter().map(|t| (7, t.map(|i| ball.positions[i as usize] + toward.as_vec3())));
         let eye = Eye { origin: Vec3::ZERO, normal: Vec3::Y };
-        let counts = Counts { blocks: &[true; 8], in_map: with_map.then_some(&[7]), targets: &[], screens: &[] };
+        let counts =
+            Counts { blocks: &[true; 8], in_map: with_map.then_some(&[7]), sky: false, targets: &[], screens: &[] };
         let standing = Standing { rotation: DMat3::IDENTITY, radius: 1.0 };
         see(&Blockers::new(corners.map(triangle), Vec::new(), Vec::new()), &standing, &eye, 4, Rays::Many, counts)
     }
@@ -727,7 +740,7 @@ mod tests {
             let wanted: f64 =
                 directions.iter().zip(&hits).filter(|(_, hit)| hit.is_some()).map(|(d, _)| f64::from(d.y)).sum();
             let wanted = wanted / directions.iter().map(|d| f64::from(d.y)).sum::<f64>();
-            let counts = Counts { blocks: &[true], in_map: None, targets: &[], screens: &[] };
+            let counts = Counts { blocks: &[true], in_map: None, sky: false, targets: &[], screens: &[] };
             let found = see(&blockers, &standing, &eye, 4, Rays::Many, counts).blocked;
             mean += (found / wanted - 1.0) / PLACES as f64;
             square += (found / wanted - 1.0).powi(2) / PLACES as f64;
@@ -768,7 +781,7 @@ mod tests {
         let eye = Eye { origin: Vec3::ZERO, normal: Vec3::Y };
         let standing = Standing { rotation: DMat3::IDENTITY, radius: 1.0 };
         let see_with = |in_map: &[u32], corners: &[(u32, [Vec3; 3])]| {
-            let counts = Counts { blocks: &[true; 2], in_map: Some(in_map), targets: &[], screens: &[] };
+            let counts = Counts { blocks: &[true; 2], in_map: Some(in_map), sky: false, targets: &[], screens: &[] };
             see(
                 &Blockers::new(corners.iter().copied().map(triangle), Vec::new(), Vec::new()),
                 &standing,

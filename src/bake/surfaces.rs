@@ -18,6 +18,7 @@ use crate::asset::mesh::Attributes;
 use crate::asset::texture::Texture;
 use crate::field::quantity::channel_stride;
 use crate::field::self_visibility::{self, BYTES, frame};
+use crate::field::sky_view::SkyViews;
 use crate::layout::{CLUSTER_VERTICES, MOST_SUNS, pack_suns};
 use crate::scene::groups::Groups;
 use crate::scene::{Placement, Scene};
@@ -30,7 +31,7 @@ use std::sync::{Arc, OnceLock};
 use std::time::Instant;
 
 /// Counts in every name of the cache: another number where a bake of surfaces computes something else.
-const VERSION: u32 = 59;
+const VERSION: u32 = 61;
 /// How far towards the middle of its triangles a vertex is seen from, as a share of the way: the light of a crease is
 /// that just inside each face. Where meshes are left as they are, so are the places from which they are seen.
 const NUDGE: f32 = 0.02;
@@ -111,6 +112,8 @@ pub struct GroupPlan {
     pub entities: Vec<usize>,
     members: Vec<Member>,
     wanted: Wanted,
+    /// Whether transfer vectors will be fitted to the sky.
+    views_sky: bool,
     bands: usize,
     /// Vertices to which all surfaces of the scene may grow, and whether anything moves in it.
     refinement: Option<(u32, bool)>,
@@ -151,6 +154,8 @@ pub struct BakedSurface {
     pub mesh: Arc<Mesh>,
     /// Transfer vectors in the mesh's order of vertices, or `None` where the cosine lobe of the normal is exact.
     pub transfer: Option<Arc<Vec<f32>>>,
+    /// What every vertex sees of the sky, in the order of clusters; `None` where transfer vectors stay as they are.
+    pub sky: Option<Arc<SkyViews>>,
     /// Self-visibility of every vertex, [`BYTES`] each, or `None` where no sharp light is blocked.
     pub self_visibility: Option<Arc<Vec<u8>>>,
     /// For each cluster the members whose shadows of sharp lights its maps have.
@@ -177,6 +182,7 @@ impl BakedSurface {
         BakedSurface {
             mesh: mesh.clone(),
             transfer: None,
+            sky: None,
             self_visibility: None,
             near: Vec::new(),
             links: None,
@@ -241,10 +247,11 @@ impl SurfacePlan {
             let screens = if is_resting_group { screens.clone() } else { Vec::new() };
             // Vertices of meshes that are left as they are may lie in the very seam of two walls.
             let suns = if is_resting_group && refinement.is_some() { suns.clone() } else { Vec::new() };
-            let plan = GroupPlan {
+            plans.push(GroupPlan {
                 entities,
                 members,
                 wanted,
+                views_sky: false,
                 bands,
                 refinement,
                 suns,
@@ -252,16 +259,21 @@ impl SurfacePlan {
                 key: None,
                 name: String::new(),
                 volume: None,
-            };
-            let plan = plan.named();
+            });
+        }
+        let named = |plan: GroupPlan| {
+            // Several entities with one mesh share what is baked, but not which way they stand.
+            let has_one_sky = plan.members.len() > 1 || plan.entities.len() == 1;
+            let views_sky = wanted.transfer && has_one_sky && scene.is_at_rest(plan.entities[0]);
+            let plan = GroupPlan { views_sky, ..plan }.named();
             // Of the sky, and of surfaces that light bounces from.
             let has_use = wanted.transfer || options.groups;
             let moved = has_use.then(|| plan.moved_among(scene)).flatten();
             let volume =
                 moved.and_then(|(wanted, radius_m)| VolumePlan::new(&plan.name, wanted, radius_m, options.bands));
-            plans.push(GroupPlan { volume, ..plan });
-        }
-        SurfacePlan { groups: plans }
+            GroupPlan { volume, ..plan }
+        };
+        SurfacePlan { groups: plans.into_iter().map(named).collect() }
     }
 
     /// Names of all that is baked, whatever the suns: another scene with these names can do with the same surfaces.
@@ -295,6 +307,7 @@ impl GroupPlan {
             entities: Vec::new(),
             members,
             wanted,
+            views_sky: false,
             bands,
             refinement: None,
             suns: Vec::new(),
@@ -330,7 +343,7 @@ impl GroupPlan {
         let numbers = format!(
             "{VERSION} {} {:?} {:?} {PATTERN} {TRANSFER_OFFSET} {:?}",
             self.bands,
-            self.wanted,
+            (self.wanted, self.views_sky),
             self.refinement,
             [self_visibility::RIM, self_visibility::LIMIT_RAD, self_visibility::DISTANCE_STEPS]
         );
@@ -670,7 +683,13 @@ impl GroupSpace<'_> {
         let group = self.group;
         let eye = Eye { origin: self.placed(position + nudge).into(), normal };
         let standing = &group.standings[self.member];
-        let counts = Counts { blocks: &self.blocks, in_map, targets: &group.targets, screens: &group.screens };
+        let counts = Counts {
+            blocks: &self.blocks,
+            in_map,
+            sky: group.plan.views_sky,
+            targets: &group.targets,
+            screens: &group.screens,
+        };
         let mut seen = see(&group.blockers, standing, &eye, group.plan.bands, rays, counts);
         seen.from = position + nudge;
         let is_covered = self.is_covered(position, normal, nudge);
@@ -890,6 +909,7 @@ impl GroupSpace<'_> {
         let is_in_map =
             |member: &u32| self.blocks[*member as usize] && (shades_itself || *member as usize != self.member);
         let mut linked = Links::default();
+        let mut sky = SkyViews { of_world: plan.members.len() > 1, ..SkyViews::default() };
         let clusters: Vec<&[u32]> = order.chunks(CLUSTER_VERTICES as usize).collect();
         let mut done = 0;
         for batch in clusters.chunks(16) {
@@ -977,6 +997,7 @@ impl GroupSpace<'_> {
                     if !plan.screens.is_empty() {
                         linked.directions.extend(links.iter().map(|link| link.direction));
                     }
+                    sky.push(&seen.sky);
                     suns[v as usize] = vertex.suns;
                     any_blocked |= seen.blocked > 0.0;
                     transfer[v as usize * stride..][..stride].copy_from_slice(&vertex.transfer);
@@ -994,6 +1015,7 @@ impl GroupSpace<'_> {
         BakedSurface {
             mesh,
             transfer: (any_blocked && wanted.transfer).then(|| Arc::new(transfer)),
+            sky: (any_blocked && plan.views_sky).then(|| Arc::new(sky)),
             self_visibility: (any_blocked && any_in_map && has_maps).then(|| Arc::new(maps)),
             near,
             links: (!linked.packed.is_empty()).then(|| Arc::new(linked)),
@@ -1147,6 +1169,8 @@ struct StoredSurface {
     /// Whether its geometry follows, as that of a mesh that was refined.
     refined: bool,
     transfer: bool,
+    /// Shares of the sky, whose counts for every vertex come before them.
+    sky: Option<usize>,
     self_visibility: bool,
     told_suns: bool,
     /// Links, whose counts for every vertex come before them; 0 without counts where no vertex has any.
@@ -1171,7 +1195,7 @@ impl GroupPlan {
         let mut payload = Vec::new();
         let mut stored = Vec::new();
         for (member, surface) in self.members.iter().zip(surfaces) {
-            let BakedSurface { mesh, transfer, self_visibility, near, links, told_suns } = surface;
+            let BakedSurface { mesh, transfer, sky, self_visibility, near, links, told_suns } = surface;
             let refined = !Arc::ptr_eq(mesh, &member.mesh);
             if refined {
                 payload.extend_from_slice(bytemuck::cast_slice(&mesh.positions));
@@ -1183,6 +1207,10 @@ impl GroupPlan {
             }
             if let Some(floats) = transfer {
                 payload.extend_from_slice(bytemuck::cast_slice(floats));
+            }
+            if let Some(views) = sky {
+                payload.extend_from_slice(&views.counts);
+                payload.extend_from_slice(views.cells.as_flattened());
             }
             if let Some(maps) = self_visibility {
                 payload.extend_from_slice(maps);
@@ -1200,6 +1228,7 @@ impl GroupPlan {
                 triangles: mesh.triangles.len(),
                 refined,
                 transfer: transfer.is_some(),
+                sky: sky.as_ref().map(|views| views.cells.len()),
                 self_visibility: self_visibility.is_some(),
                 told_suns: told_suns.is_some(),
                 links: links.as_ref().map_or(0, |links| links.packed.len()),
@@ -1256,6 +1285,15 @@ impl GroupPlan {
                 true => Some(Arc::new(bytemuck::pod_collect_to_vec(take(floats)?))),
                 false => None,
             };
+            let sky = match stored.sky {
+                Some(shares) => {
+                    let counts = take(stored.vertices)?.to_vec();
+                    let cells: Vec<[u8; 2]> = vectors(&mut take, shares)?;
+                    (counts.iter().map(|count| usize::from(*count)).sum::<usize>() == shares).then_some(())?;
+                    Some(Arc::new(SkyViews { of_world: self.members.len() > 1, counts, cells }))
+                }
+                None => None,
+            };
             let self_visibility = match stored.self_visibility {
                 true => Some(Arc::new(take(stored.vertices.checked_mul(BYTES)?)?.to_vec())),
                 false => None,
@@ -1280,7 +1318,7 @@ impl GroupPlan {
                 let count: u32 = bytemuck::pod_read_unaligned(take(4)?);
                 near.push(bytemuck::pod_collect_to_vec(take(4 * count as usize)?));
             }
-            surfaces.push(BakedSurface { mesh, transfer, self_visibility, near, links, told_suns });
+            surfaces.push(BakedSurface { mesh, transfer, sky, self_visibility, near, links, told_suns });
         }
         rest.is_empty().then_some(surfaces)
     }

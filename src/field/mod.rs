@@ -14,6 +14,7 @@ pub mod sheet;
 pub mod silhouette;
 pub mod silhouette_header;
 pub mod silhouette_nodes;
+pub mod sky_view;
 pub mod sub_light;
 pub mod visibility_volume;
 

@@ -56,6 +56,7 @@ impl Frame {
         if sky {
             self.work.lists.renewed = true;
             self.sky.write(scene, self.options.bake.bands)?;
+            self.buffers.forget_sky();
             self.reflections.as_mut().map_or(Ok(()), |reflections| reflections.set_sky(&scene.environment))?;
         }
         Ok(())

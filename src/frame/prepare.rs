@@ -85,6 +85,7 @@ impl Frame {
 
     /// The dirty clusters and their lists.
     fn prepare_merge(&mut self, placements: &[Placement]) -> Result<()> {
+        self.buffers.fit_sky(&self.scene, placements)?;
         let state = self.state(placements);
         let work = &mut self.work;
         if !std::mem::replace(work.recorded.get_mut(), false) {

@@ -16,6 +16,7 @@ use crate::field::ShadowField;
 use crate::field::quantity::channel_stride;
 use crate::field::self_visibility::{self, BYTES, CELLS};
 use crate::field::sheet::Rectangle;
+use crate::field::sky_view::{SkyFit, SkyViews};
 use crate::field::visibility_volume::SceneVolume;
 use crate::gpu::{Buffer, Device, Texture};
 pub use crate::layout::ALIGNMENT;
@@ -23,10 +24,10 @@ use crate::layout::{CLUSTER_VERTICES, NONE};
 use crate::lists::gather::ClusterBounds;
 use crate::lists::sight::TriangleRun;
 use crate::scene::groups::Groups;
-use crate::scene::{Lights, MapIndices, Scene};
+use crate::scene::{Lights, MapIndices, Placement, Scene};
 use field_atlas::FieldAtlas;
 pub use field_atlas::FieldSlot;
-use glam::DVec3;
+use glam::{DQuat, DVec3};
 use rayon::prelude::*;
 pub use silhouettes::{MeshSlots, Silhouettes, Slot};
 use std::ops::Range;
@@ -64,6 +65,9 @@ pub struct DeviceSurface {
     pub faces: Vec<TriangleRun>,
     /// First quad of its transfer vectors, or [`NONE`] where the cosine lobe of the normal is exact.
     pub transfer_first: u32,
+    /// What its vertices see of the sky, and their transfer vectors before they are fitted to it, in the mesh's order; `None`
+    /// where they stay as they are.
+    own_view: Option<(Arc<SkyViews>, Arc<Vec<f32>>)>,
     /// First cell of its self-visibility, or [`NONE`] where it needs none.
     pub self_first: u32,
     /// Self-visibility in the mesh's order of vertices, if it needs any.
@@ -94,6 +98,8 @@ pub struct SceneBuffers {
     /// The scene's textures; those that are equal are shared.
     pub textures: Vec<Arc<Texture>>,
     surface_of: Vec<usize>,
+    /// For each entity which way it stood when its transfer vectors were fitted to the sky; `None` where they are not.
+    fitted: Vec<Option<DQuat>>,
     /// The bakes that were not found in the cache.
     pub baked: Vec<Baked>,
     /// SH bands of radiance fields and transfers.
@@ -152,6 +158,7 @@ impl Packing {
             clusters: clusters::bounds(mesh, &order),
             faces: TriangleRun::around(mesh, &order, CLUSTER_VERTICES as usize),
             transfer_first,
+            own_view: baked.sky.clone().zip(baked.transfer.clone()),
             drawn,
             reach_m,
             order,
@@ -220,10 +227,55 @@ impl SceneBuffers {
                 let is_number = |maps: MapIndices| maps.gloss == Some(index) || maps.normal == Some(index);
                 scene.entities.iter().any(|entity| is_number(entity.maps))
             })?,
+            fitted: vec![None; baked.surface_of.len()],
             surface_of: baked.surface_of,
             baked: baked.baked,
             bands: options.bands,
         })
+    }
+
+    /// Fits the transfer vectors of what rests to the sky of the scene ([`crate::field::sky_view`]), where they are not yet.
+    pub fn fit_sky(&mut self, scene: &Scene, placements: &[Placement]) -> Result<()> {
+        let environment = &scene.environment;
+        let sky = |turn: DQuat| {
+            let radiance = |toward: DVec3| DVec3::from_array(environment.radiance(toward));
+            SkyFit::new(&radiance, environment.coefficients(self.bands), turn)
+        };
+        let wanted = |entity: usize| {
+            let (views, _) = self.surfaces[self.surface_of[entity]].own_view.as_ref()?;
+            let turn = placements[entity].turn();
+            // What a member of a group saw from where it stood tells nothing once it is turned. No band blurs an even sky.
+            let is_known = !views.of_world || turn == scene.data.entities[entity].fixed().turn();
+            (is_known && !environment.is_uniform()).then_some(turn)
+        };
+        let wanted: Vec<Option<DQuat>> = (0..self.surface_of.len()).map(wanted).collect();
+        let stale = |entity: &usize| self.fitted.get(*entity) != Some(&wanted[*entity]);
+        let stale: Vec<usize> = (0..wanted.len()).filter(stale).collect();
+        if stale.is_empty() {
+            return Ok(());
+        }
+        let of_world = sky(DQuat::IDENTITY);
+        let stride = channel_stride(self.bands);
+        let fitted = |entity: usize| {
+            let surface = &self.surfaces[self.surface_of[entity]];
+            let (views, transfer) = surface.own_view.as_ref()?;
+            let in_order = surface.order.iter().flat_map(|&v| &transfer[v as usize * stride..][..stride]);
+            let mut fitted: Vec<f32> = in_order.copied().collect();
+            match wanted[entity] {
+                Some(turn) if views.of_world => of_world.fit(views, turn, &mut fitted, stride),
+                Some(turn) => sky(turn).fit(views, turn, &mut fitted, stride),
+                None => {}
+            }
+            Some((u64::from(surface.transfer_first) * 16, fitted))
+        };
+        let all: Vec<(u64, Vec<f32>)> = stale.into_par_iter().filter_map(fitted).collect();
+        self.fitted = wanted;
+        all.iter().try_for_each(|(at, fitted)| self.transfers.fill(*at, fitted))
+    }
+
+    /// Forgets to which sky transfer vectors are fitted.
+    pub fn forget_sky(&mut self) {
+        self.fitted.clear();
     }
 
     /// The volume as `take_volume` in `glsl/merge.comp` reads it: the first node and 1 / step; how many nodes there are
@@ -269,6 +321,14 @@ impl SceneBuffers {
     pub fn field(&self, slot: &FieldSlot) -> Result<ShadowField> {
         let payload = self.fields.download_range(slot.bytes.clone())?;
         Ok(ShadowField { header: slot.header.clone(), payload })
+    }
+
+    /// As [`SceneBuffers::transfer`], before they were fitted to the sky.
+    pub fn baked_transfer(&self, surface: &DeviceSurface) -> Result<Option<(Vec<f32>, usize)>> {
+        match &surface.own_view {
+            Some((_, transfer)) => Ok(Some((transfer.to_vec(), channel_stride(self.bands)))),
+            None => self.transfer(surface),
+        }
     }
 
     /// A copy of a surface's transfer vectors, in the mesh's order of vertices, and the floats of each.

@@ -586,7 +586,9 @@ vec3 chain_sum(Surface surface, uint i, uint end) {
     i = (told_suns >> MOST_SUNS & shining.sun_bit) != 0 ? end : i;
 #endif
     uint first_block = light.fine >= 1.0 ? 1 : 0, last_block = light.fine <= 0.0 ? 0 : 4;
-    vec4 shares[BLOCKS]; // irradiance by the parts of each block
+    // Irradiance by the parts of each block, all of which are added up whatever blocks a light has: on lavapipe lanes that
+    // leave a loop before others lose the sum.
+    vec4 shares[BLOCKS] = vec4[](vec4(0.0), vec4(0.0), vec4(0.0), vec4(0.0), vec4(0.0));
 #if SHOWN || PANELS || HIDES
     open_share = 0.0;
 #endif
@@ -703,11 +705,11 @@ vec3 chain_sum(Surface surface, uint i, uint end) {
 #endif
 #if KEEPS
     float passed = 0.0;
-    b = first_block;
+    b = 0;
     do {
         passed += dot(of_block(shares, b), vec4(1.0));
         b++;
-    } while (b <= last_block);
+    } while (b < BLOCKS);
 #endif
     float irradiance = 0.0;
 #if COLORS
@@ -716,7 +718,7 @@ vec3 chain_sum(Surface surface, uint i, uint end) {
     vec3 down = to_object(shining, light.down), colored = vec3(0.0);
     mat3x4 colors = lamp_colors(has_colors ? shining.radiance_base : 0, toward, light.sine);
 #endif
-    b = first_block;
+    b = 0;
     do {
         vec4 share = of_block(shares, b);
         irradiance += shines * dot(share, vec4(1.0));
@@ -729,7 +731,7 @@ vec3 chain_sum(Surface surface, uint i, uint end) {
         }
 #endif
         b++;
-    } while (b <= last_block);
+    } while (b < BLOCKS);
 #if COLORS
     irradiance = has_colors ? dot(colored, vec3(1.0 / 3.0)) : irradiance;
 #endif

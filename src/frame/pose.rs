@@ -5,7 +5,7 @@ use crate::field::cuboid::{Cuboid, PlacedCuboid};
 use crate::field::quantity::channel_stride;
 use crate::field::sheet::{Rectangle, Sheet};
 use crate::field::sub_light::LampFace;
-use crate::field::{Area, Fit, self_visibility};
+use crate::field::{Fit, self_visibility};
 use crate::layout::{self, CLUSTER_VERTICES, NONE};
 use crate::lists::gather::{ClusterBounds, EntityBounds, Globe, Occludes, OutlineShape, OutlineView, SceneBounds};
 use crate::lists::incremental::{Member, State};
@@ -164,9 +164,7 @@ impl Frame {
             let (slope, offset) = lattice.radial_map();
             [slope as f32, offset as f32, lattice.inner as f32, lattice.outer as f32]
         });
-        let area = device_mesh.blocked.as_ref().map_or(Area::default(), |slot| slot.area);
-        let lamp_area = device_mesh.slots.lamp_area.filter(|_| is_sharp && method == LightMethod::Outline);
-        let area = lamp_area.unwrap_or(area);
+        let area = device_mesh.area().unwrap_or_default();
         let sheet = self.sheet(index, placement).map(|sheet| sheet.rectangle);
         let axes = sheet.map_or(area.axes.map(|axis| rotation * axis), |rectangle| rectangle.axes);
         let [area_x, area_y] = axes.map(|axis| axis.as_vec3());

@@ -12,12 +12,12 @@ use crate::bake::ensure::Baked;
 use crate::bake::{self, BakedScene, BakedSurface};
 use crate::draw::DrawnMesh;
 use crate::error::Result;
-use crate::field::ShadowField;
 use crate::field::quantity::channel_stride;
 use crate::field::self_visibility::{self, BYTES, CELLS};
 use crate::field::sheet::Rectangle;
 use crate::field::sky_view::{SkyFit, SkyViews};
 use crate::field::visibility_volume::SceneVolume;
+use crate::field::{Area, ShadowField};
 use crate::gpu::{Buffer, Device, Texture};
 pub use crate::layout::ALIGNMENT;
 use crate::layout::{CLUSTER_VERTICES, NONE};
@@ -48,6 +48,13 @@ pub struct DeviceMesh {
     pub radius_m: f64,
     /// Least and largest corner of its box, metres.
     pub extent_m: [DVec3; 2],
+}
+
+impl DeviceMesh {
+    /// What it fills of its bounding sphere's disc from afar: that of its field, else of its outline if that shines.
+    pub fn area(&self) -> Option<Area> {
+        self.blocked.as_ref().map(|slot| slot.area).or(self.slots.lamp_area)
+    }
 }
 
 /// A mesh as it is lit and drawn: where its vertices and their own visibility lie. Entities share it where both are

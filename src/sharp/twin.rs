@@ -21,8 +21,8 @@ pub struct SharpObject<'f> {
     /// Bounding radius after scaling, metres.
     pub radius_m: f64,
     pub silhouette: Option<&'f SilhouetteField>,
-    /// Its area from afar, if it shines by its outline.
-    pub lamp_area: Option<Area>,
+    /// Its area from afar, if it is known.
+    pub area: Option<Area>,
     /// The box that blocks in place of an outline.
     pub cuboid: Option<Cuboid>,
     /// The rectangle that blocks in place of an outline.
@@ -140,7 +140,7 @@ impl SharpTwin<'_> {
             let between: Vec<Near> = occluders.iter().map(|object| near(object, toward)).collect();
             // From afar the light is one block, which its area covers.
             let is_whole = number == 0 && seen.fine < 1.0;
-            let area = shining.lamp_area.filter(|_| share.is_none() && is_whole);
+            let area = shining.area.filter(|_| share.is_none() && is_whole);
             let share = share.or(area.map(|area| area.at(shining.rotation.inverse() * seen.toward)));
             let own = share.is_none().then(|| near(shining, toward));
             let part = |part: &LightPart| {

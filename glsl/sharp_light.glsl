@@ -703,15 +703,7 @@ vec3 chain_sum(Surface surface, uint i, uint end) {
         }
     } while (is_kind(packed, ENTRY_GLOBE));
 #endif
-#if KEEPS
     float passed = 0.0;
-    b = 0;
-    do {
-        passed += dot(of_block(shares, b), vec4(1.0));
-        b++;
-    } while (b < BLOCKS);
-#endif
-    float irradiance = 0.0;
 #if COLORS
     bool has_colors = shining.radiance_base != NONE;
     vec3 toward = to_object(shining, light.toward), across = to_object(shining, light.across);
@@ -721,7 +713,7 @@ vec3 chain_sum(Surface surface, uint i, uint end) {
     b = 0;
     do {
         vec4 share = of_block(shares, b);
-        irradiance += shines * dot(share, vec4(1.0));
+        passed += dot(share, vec4(1.0));
 #if COLORS
         Block block = block_of(light, b);
         EACH for (uint k = 0; k < 4; k++) {
@@ -732,6 +724,7 @@ vec3 chain_sum(Surface surface, uint i, uint end) {
 #endif
         b++;
     } while (b < BLOCKS);
+    float irradiance = shines * passed;
 #if COLORS
     irradiance = has_colors ? dot(colored, vec3(1.0 / 3.0)) : irradiance;
 #endif

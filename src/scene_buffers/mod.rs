@@ -31,7 +31,7 @@ use glam::{DQuat, DVec3};
 use rayon::prelude::*;
 pub use silhouettes::{MeshSlots, Silhouettes, Slot};
 use std::ops::Range;
-use std::sync::Arc;
+use std::sync::{Arc, LazyLock};
 
 /// A mesh of the scene as it shades and shines: its fields.
 pub struct DeviceMesh {
@@ -181,8 +181,10 @@ impl SceneBuffers {
         let FieldAtlas { fields, slots, volume_first } =
             field_atlas::field_atlas(device, scene, &baked.meshes, volume, options)?;
         let casters: Vec<_> = (0..scene.meshes.len()).map(|mesh| scene.caster(mesh)).collect();
+        // A field tells the area of what has one.
         let shines = |mesh: usize| scene.entities.iter().any(|entity| entity.mesh == mesh && entity.emits);
-        let (silhouettes, mesh_slots) = Silhouettes::new(device, &baked.meshes, &casters, shines)?;
+        let wants_area = |mesh: usize| slots[mesh][0].is_none() && shines(mesh);
+        let (silhouettes, mesh_slots) = Silhouettes::new(device, &baked.meshes, &casters, wants_area)?;
         let meshes = casters.into_iter().zip(slots).zip(mesh_slots).map(|((caster, [blocked, radiance]), slots)| {
             let (centre, radius_m) = caster.bounding_sphere();
             DeviceMesh {
@@ -261,7 +263,7 @@ impl SceneBuffers {
         if stale.is_empty() {
             return Ok(());
         }
-        let of_world = sky(DQuat::IDENTITY);
+        let of_world = LazyLock::new(|| sky(DQuat::IDENTITY));
         let stride = channel_stride(self.bands);
         let fitted = |entity: usize| {
             let surface = &self.surfaces[self.surface_of[entity]];

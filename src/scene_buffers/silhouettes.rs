@@ -34,7 +34,7 @@ pub struct Slot<T> {
 pub struct MeshSlots {
     /// Silhouette field, if an entity needs one.
     pub silhouette: Option<Slot<Arc<SilhouetteField>>>,
-    /// Its area from afar, if it shines by its outline.
+    /// The outline's area from afar, of what shines and has no field.
     pub lamp_area: Option<Area>,
     /// The box that it is, if it is one.
     pub cuboid: Option<Slot<Cuboid>>,
@@ -46,12 +46,12 @@ pub struct MeshSlots {
 
 impl Silhouettes {
     /// Uploads the fields of a scene's meshes and the boxes that `casters` are or consist of, and returns each mesh's
-    /// place. Meshes that share a field share its place. `shines` tells of which meshes outlines shine.
+    /// place. Meshes that share a field share its place. `wants_area` tells of which meshes the area from afar is needed.
     pub fn new(
         device: &Arc<Device>,
         baked: &[BakedMesh],
         casters: &[&Arc<Mesh>],
-        shines: impl Fn(usize) -> bool,
+        wants_area: impl Fn(usize) -> bool,
     ) -> Result<(Self, Vec<MeshSlots>)> {
         let mut nodes = Vec::<[f32; 4]>::new();
         let mut cells = Vec::<[u32; 2]>::new();
@@ -90,7 +90,7 @@ impl Silhouettes {
         let colors = baked.iter().map(|mesh| mesh.lamp_colors.as_ref().map(&mut colors_slot));
         let slots = silhouettes.into_iter().zip(boxes).zip(colors);
         let of_mesh = |(mesh, ((silhouette, (cuboid, boxes)), lamp_colors))| {
-            let lamp: Option<&Slot<Arc<SilhouetteField>>> = Option::as_ref(&silhouette).filter(|_| shines(mesh));
+            let lamp: Option<&Slot<Arc<SilhouetteField>>> = Option::as_ref(&silhouette).filter(|_| wants_area(mesh));
             let lamp_area = lamp.map(|slot| slot.content.area());
             MeshSlots { silhouette, lamp_area, cuboid, boxes, lamp_colors }
         };

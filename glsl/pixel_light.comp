@@ -77,9 +77,20 @@ uvec4 light_of_surface(SeenSurface seen, float depth) {
     surface.origin = receiver.centre.xyz;
     surface.inverse_radius = receiver.centre.w;
     surface.step = receiver.scale * float(push.texel_px) * seen.step;
+#if SUN_MAPS
+    surface.ground = normalize(to_world(receiver, cross(corners[1] - corners[0], corners[2] - corners[0])));
+    surface.sun_maps = receiver.sun_maps;
+    surface.lifted = vec3(0.0);
+    surface.is_round = false;
+#endif
     [[unroll]] for (uint i = 0; i < FACINGS; i++) {
         vec3 normal = texelFetch(vertices, int(2 * (by_pixel.z + own[i]) + 1)).xyz;
         surface.facings[i] = facing_of(receiver, normal, seen.weights[i], by_pixel.w, own[i]);
+#if SUN_MAPS
+        float below = max(dot(corners[i] - at, normal), 0.0);
+        surface.lifted += receiver.scale * seen.weights[i] * below * surface.facings[i].normal;
+        surface.is_round = surface.is_round || dot(surface.facings[i].normal, surface.ground) < FLAT;
+#endif
 #if SELF
         surface.facings[i].aside = receiver.scale * to_world(receiver, corners[i] - at);
         surface.facings[i].counts = !own_maps || own[i] / WORKGROUP == nearest / WORKGROUP;

@@ -95,6 +95,11 @@ struct Facing {
 #endif
 };
 
+#if SUN_MAPS && BLENDS
+#include "sun_map.glsl"
+uint current_map; // bit of the current light's map, or 0
+#endif
+
 struct Surface {
     vec3 position; // world axes, metres from `origin`
     vec3 origin;   // world
@@ -102,6 +107,12 @@ struct Surface {
     Facing facings[FACINGS];
 #if EDGES
     float step;    // farthest that a neighbouring vertex or pixel is, metres
+#endif
+#if SUN_MAPS && BLENDS
+    vec3 ground;   // normal of the triangle, world
+    vec3 lifted;   // to the round surface that the triangle stands for (Hanika, Ray Tracing Gems II, chapter 4), metres
+    bool is_round; // whether it stands for one
+    uint sun_maps; // that its object stands in
 #endif
 };
 
@@ -379,6 +390,9 @@ vec4 part_shares(Surface surface, SeenLight light, Block block) {
 #if SELF
             // A part's radius is small enough for its sine to stand for it.
             bool shadows = facing.self_first != NONE;
+#if SUN_MAPS && BLENDS
+            shadows = shadows && (surface.sun_maps & current_map) == 0;
+#endif
             vec3 toward = direction;
             float far = reach;
 #if FACINGS > 1
@@ -582,8 +596,13 @@ vec3 chain_sum(Surface surface, uint i, uint end) {
 #endif
 #if HIDES
     // Where the sun is hidden from all around, no edge of its shadow is looked for.
-    bool is_hidden = (told_suns & shining.sun_bit) != 0;
-    i = (told_suns >> MOST_SUNS & shining.sun_bit) != 0 ? end : i;
+    uint told = told_suns & shining.sun_bits;
+    bool is_hidden = (told & ALL_SUNS) != 0;
+    bool hides_around = (told & ALL_SUNS << MOST_SUNS) != 0;
+    i = hides_around ? end : i;
+#endif
+#if SUN_MAPS && BLENDS
+    current_map = shining.sun_maps;
 #endif
     uint first_block = light.fine >= 1.0 ? 1 : 0, last_block = light.fine <= 0.0 ? 0 : 4;
     // Irradiance by the parts of each block, all of which are added up whatever blocks a light has: on lavapipe lanes that
@@ -724,6 +743,20 @@ vec3 chain_sum(Surface surface, uint i, uint end) {
 #endif
         b++;
     } while (b < BLOCKS);
+#if SUN_MAPS && BLENDS
+    if (current_map != 0) {
+        SunMap map = sun_map_at(max(findLSB(current_map), 0));
+        vec3 place = surface.position + surface.lifted + (surface.origin - map.middle);
+        float steps;
+        passed *= sun_share(map, place, surface.ground, surface.is_round, surface.step, steps);
+        nearest = max(nearest, steps);
+    }
+#elif SUN_MAPS && KEEPS
+    // Pixels look up the map, but for where all around is hidden.
+    bool is_mapped = shining.sun_maps != 0;
+    nearest = is_mapped && !hides_around ? MOST_STEPS : nearest;
+    unblocked = is_mapped ? open_share : unblocked;
+#endif
     float irradiance = shines * passed;
 #if COLORS
     irradiance = has_colors ? dot(colored, vec3(1.0 / 3.0)) : irradiance;
@@ -732,6 +765,9 @@ vec3 chain_sum(Surface surface, uint i, uint end) {
     cone *= cone;
 #if EDGES
     bool hidden = covered == (2u << last_block) - (1u << first_block);
+#if SUN_MAPS
+    hidden = hidden && shining.sun_maps == 0;
+#endif
     finest = hidden ? 0.0 : nearest;
     find_rim(ramp, shining, surface.step / max(light.distance, 1e-30));
     float white = cone * dot(shining.emission, vec3(1.0));
@@ -746,7 +782,7 @@ vec3 chain_sum(Surface surface, uint i, uint end) {
 #endif
 #if HIDES
     // What rays know; what is kept is for pixels around the vertex, by outlines as they evaluate it.
-    bool is_free = (told_suns >> (2 * MOST_SUNS) & shining.free_bit) != 0;
+    bool is_free = (told & ALL_SUNS << 2 * MOST_SUNS) != 0;
     irradiance = is_hidden ? 0.0 : is_free ? shines * open_share : irradiance;
 #endif
 #if SHOWN

@@ -111,10 +111,11 @@ shared_struct! {
         irradiance_first: u32,
         /// Of a tube: its thickness over its width, 1 of a round one; see [`crate::field::sub_light::LampFace::Tube`].
         light_thin: f32,
-        /// Of a sun: its bit among those that a vertex tells hidden, see [`pack_suns`]; 0 of any other light.
-        sun_bit: u32,
-        /// The same where nothing moves or lets light through that may hide a sun of which a vertex sees all.
-        free_bit: u32,
+        /// Of a sun: the bits that a vertex has of it, see [`pack_suns`]; the last where nothing moves or lets light
+        /// through that may hide a sun of which a vertex sees all. 0 of any other light.
+        sun_bits: u32,
+        /// Of a sun the bit of its map, if it has one; of what occludes those of the maps that hold it.
+        sun_maps: u32,
     }
 }
 
@@ -156,6 +157,33 @@ shared_struct! {
         sharp_count: u32,
         /// First cell of its first vertex's self-visibility, or [`NONE`] where the mesh cannot shadow itself.
         self_first: u32,
+    }
+}
+
+shared_struct! {
+    /// A map of what rests as a sun sees it ([`crate::draw::sun_map`]): `SunMap` of the shaders.
+    SunMap {
+        /// Factors on a place from its middle, metres, and the sum's offset: to texels.
+        across: [f32; 3],
+        across_first: f32,
+        down: [f32; 3],
+        down_first: f32,
+        /// Unit direction to the sun, world.
+        toward: [f32; 3],
+        /// Where heights begin along it from the middle, metres.
+        lowest: f32,
+        /// Centres of its first and last texels.
+        low: [f32; 2],
+        high: [f32; 2],
+        /// The height that 1 stands for, metres.
+        range_m: f32,
+        texel_m: f32,
+        /// Of the sun's angular radius.
+        tangent: f32,
+        spare: f32,
+        /// Its middle in the world: with numbers that begin there, what lies far from the origin is as exact as any.
+        middle: [f32; 3],
+        unused: f32,
     }
 }
 
@@ -248,6 +276,8 @@ pub fn glsl(file: &str) -> Option<String> {
     Some(match file {
         "structs.glsl" => glsl_struct("Entity", DeviceEntity::FIELDS) + &glsl_struct("Cluster", Cluster::FIELDS),
         "gloss_structs.glsl" => glsl_struct("GlossEntity", GlossEntity::FIELDS),
+        "sun_map_structs.glsl" => glsl_struct("SunMap", SunMap::FIELDS),
+        "sun_map_at.glsl" => glsl_reader("SunMap sun_map_at", "sun_maps", "vec4", SunMap::FIELDS),
         "entity_at.glsl" => glsl_reader("Entity entity_at", "entities", "vec4", DeviceEntity::FIELDS),
         "cluster_at.glsl" => glsl_reader("Cluster cluster_at", "clusters", "uvec2", Cluster::FIELDS),
         "gloss_entity_at.glsl" => {
@@ -392,7 +422,7 @@ pub const TAG_STEP: f32 = 1.0 / 255.0;
 pub const COSINE_LOBE: [f64; 3] = [0.09375, 0.5, 0.46875];
 
 /// The macros that every shader has: what both languages have to agree on.
-pub fn shared_macros() -> [(&'static str, String); 15] {
+pub fn shared_macros() -> [(&'static str, String); 16] {
     let [a, b, c] = COSINE_LOBE;
     let kind = |kind: LightKind| format!("{}u", kind as u32);
     [
@@ -402,6 +432,7 @@ pub fn shared_macros() -> [(&'static str, String); 15] {
         ("HAS_HALVES", format!("{HAS_HALVES:#x}u")),
         ("OWN_MAPS", format!("{OWN_MAPS:#x}u")),
         ("MOST_SUNS", format!("{MOST_SUNS}u")),
+        ("ALL_SUNS", format!("{}u", (1 << MOST_SUNS) - 1)),
         ("FIT_BITS", FIT_BITS.to_string()),
         ("TAG_STEP", format!("{TAG_STEP:?}")),
         ("COSINE_LOBE", format!("vec3({a:?}, {b:?}, {c:?})")),

@@ -36,8 +36,9 @@
 //!   What moves among many of them reads the sky past all at once, from nodes of the box in which it moves
 //!   ([`field::visibility_volume`]). With `--lights sh`, and without the skip `static`, every entity is alone.
 //! - Surfaces: a mesh is lit and drawn with more vertices where its own visibility varies, and along the shadows of suns
-//!   ([`bake::surfaces`]). Vertices of what rests know from rays whether its own group hides a sun; outlines decide where
-//!   its shadow has edges, and where a sun or something else has moved since.
+//!   ([`bake::surfaces`]). Vertices of what rests know from rays whether its own group hides a sun. Pixels that evaluate
+//!   lights look up a map of all that rests as the sun sees it ([`draw::sun_map`]); outlines hide the sun for vertices, where
+//!   something moves, and where the sun or something that rested has moved since.
 //! - Entities: everything receives, and everything but emitters occludes. Each can be set per entity. Scales are uniform
 //!   and positive.
 //! - Transparency: what lets light through blocks its opacity's share of a field or an outline. It stands before all

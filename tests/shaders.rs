@@ -16,6 +16,7 @@ use shadow_fields::draw::grid::DrawGrid;
 use shadow_fields::draw::mirror::Mirrored;
 use shadow_fields::draw::pixel_light::{LightImages, Receiver, Step};
 use shadow_fields::draw::smooth::Smooth;
+use shadow_fields::draw::sun_map::SunMaps;
 use shadow_fields::draw::triangles::{Detail, DrawTriangles, Form, Look};
 use shadow_fields::field::{FieldKind, Storage};
 use shadow_fields::gloss::gloss_row;
@@ -81,6 +82,7 @@ fn sharp_way(bits: u32) -> SharpPermutation {
         sheets: on(1),
         cuboids: on(1) != on(2),
         globes: on(3),
+        sun_maps: on(1) != on(4),
         gloss: on(0),
         many_shown: on(0) && on(1),
         lamps: on(0),
@@ -120,12 +122,14 @@ fn drawing() -> Vec<ShaderPermutation> {
         };
         [of(1), of(4)].concat()
     });
+    let mapped = [false, true].map(SunMaps::rows).concat();
     let seen = Receiver::ALL.iter().flat_map(|receiver| LightImages::rows(*receiver));
     let lit = [Step::Coarse, Step::Fine].map(LightImages::select_row).into_iter();
     let lit = lit.chain(sharp.iter().map(LightImages::evaluate_row));
     grids
         .into_iter()
         .chain(triangles)
+        .chain(mapped)
         .chain(seen)
         .chain(lit)
         .chain([Smooth::fragment()])

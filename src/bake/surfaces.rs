@@ -134,8 +134,8 @@ pub struct GroupPlan {
 #[derive(Clone, Copy, Debug)]
 pub struct CrispSun {
     /// Unit direction, world.
-    toward: DVec3,
-    half_angle_rad: f64,
+    pub toward: DVec3,
+    pub half_angle_rad: f64,
 }
 
 /// The suns of which surfaces tell whether they are hidden, in the order of their bits, and the place of each among all

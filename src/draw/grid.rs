@@ -116,6 +116,11 @@ impl DrawnGrid {
         })
     }
 
+    /// Positions of the parallelogram and the indices of its triangles.
+    pub(super) fn parallelogram(&self) -> [&Buffer; 2] {
+        [&self.positions, &self.indices]
+    }
+
     /// Whether a device's texel views hold that many cells and that many vertices in all.
     pub fn fits(device: &Device, cells: usize, vertices: usize) -> bool {
         TexelView::fits(device, QUADS, 16 * cells as u64) && TexelView::fits(device, QUAD_FORMAT, 16 * vertices as u64)

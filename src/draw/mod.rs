@@ -12,6 +12,7 @@ pub mod pixel_light;
 pub mod show;
 pub mod sky;
 pub mod smooth;
+pub mod sun_map;
 pub mod triangles;
 
 use crate::asset::grid::Grid;

@@ -15,6 +15,7 @@
 //! runs for few pixels of each block of them.
 
 use crate::draw::grid::{self, BLOCK_CELLS};
+use crate::draw::sun_map::{SUN_BINDING, SunMaps};
 use crate::draw::triangles::DrawnTriangles;
 use crate::draw::{DEPTH, DrawnEntity, DrawnMesh, DrawnPaint, DrawnViewport, PipelineMaker, made_once};
 use crate::error::Result;
@@ -43,7 +44,7 @@ const SAME_DEPTH: f64 = 1e-4;
 /// Share of the brightest of four coarse texels by which they may differ.
 const MOST_CHANGE: f64 = 0.08;
 /// Least weight of the four coarse texels around a pixel that lie on its surface.
-const LEAST_WHOLE: f64 = 0.5;
+const LEAST_WHOLE: f64 = 0.9;
 /// Binding of pixels' light in the shaders that look it up.
 pub(super) const LIGHT_BINDING: u32 = 11;
 
@@ -80,6 +81,8 @@ pub struct PixelLight<'d> {
     pub shown: Option<[&'d Buffer; 2]>,
     /// Of all vertices by one light after another; see [`crate::sharp`].
     pub irradiances: &'d Buffer,
+    /// Maps of suns, where the scene has any.
+    pub sun_maps: Option<&'d SunMaps>,
 }
 
 /// Texel views of buffers, in the order of their bindings.
@@ -313,7 +316,7 @@ impl LightImages {
     }
 
     pub fn evaluate_row(sharp: &SharpPermutation) -> ShaderPermutation {
-        sharp.pixel_row(ShaderPermutation::new("pixel_light.comp", 4))
+        sharp.pixel_row(ShaderPermutation::new("pixel_light.comp", 4)).define("SUN_BINDING", SUN_BINDING)
     }
 
     /// Finds the light of pixels in the viewports whose pixels evaluate lights.
@@ -387,6 +390,10 @@ impl LightImages {
         let mut binds = light.binds(viewport.radiosity)?;
         binds.splice(11..14, [seen, places, depth]);
         binds.extend([work, Bind::Image(found)]);
+        if let Some(SunMaps { heights, maps, .. }) = light.sun_maps {
+            binds.extend(texels(&[(maps, QUAD_FORMAT)])?);
+            binds.push(Bind::Image(heights));
+        }
         let push = EvaluatePush { list: step as u32, texel_px };
         let groups = (&self.work, PixelWork::STEPS_AT + PixelWork::STEP_BYTES * step as u64);
         commands.dispatch_indirect(self.evaluate()?, &binds, &push, groups)

@@ -23,6 +23,7 @@ mod radiosity;
 mod record;
 mod seams;
 mod sky;
+mod sun_maps;
 mod twin;
 mod viewport;
 
@@ -32,6 +33,7 @@ use crate::bake::surfaces::{SurfacePlan, crisp_suns};
 use crate::bake::{self, Baker, SceneNeeds};
 use crate::bounce::{Bounce, BounceWork, Bounces, Linked, LinkedEntity};
 use crate::draw::Shading;
+use crate::draw::sun_map::SunMaps;
 use crate::error::Result;
 use crate::gloss::Reflections;
 use crate::gpu::{self, Bind, Buffer, Commands, Device, Timing};
@@ -53,6 +55,7 @@ use radiosity::RadiosityBuffers;
 use sky::SkyLight;
 use std::ops::Range;
 use std::sync::Arc;
+use sun_maps::ToldSun;
 
 pub use memory::PictureMemory;
 #[cfg(feature = "cli")]
@@ -78,9 +81,8 @@ pub struct Frame {
     scene: Scene,
     /// Which entities never move against each other.
     groups: Groups,
-    /// Entities of the suns of which vertices tell whether they are hidden, in the order of their bits, and where they
-    /// stood.
-    told_suns: Vec<(usize, Placement)>,
+    /// The suns of which vertices tell whether they are hidden, in the order of their bits.
+    told_suns: Vec<ToldSun>,
     /// What occludes and rested when that was baked, and where.
     stood: Vec<(usize, Placement)>,
     /// How far the rectangles that entities are reach into boxes; see [`seams::reaches`].
@@ -105,6 +107,8 @@ pub struct Frame {
     bounce: Option<Bounce>,
     reflections: Option<Reflections>,
     reflectors: mirror::Reflectors,
+    /// Maps of suns, once a picture evaluates lights by them.
+    sun_maps: Option<SunMaps>,
     picture: FramePicture,
 }
 
@@ -227,8 +231,8 @@ impl Frame {
             device: device.clone(),
             library: library.clone(),
             told_suns: crisp_suns(&scene)
-                .map(|(place, _)| scene.data.entities.len() + place)
-                .map(|sun| (sun, placements[sun]))
+                .map(|(place, sun)| (scene.data.entities.len() + place, sun))
+                .map(|(entity, sun)| ToldSun { entity, stood: placements[entity], sun })
                 .collect(),
             stood: (0..scene.data.entities.len())
                 .filter(|&entity| scene.entities[entity].occludes && scene.is_at_rest(entity))
@@ -250,6 +254,7 @@ impl Frame {
             reflections,
             reflectors,
             chains: None,
+            sun_maps: None,
             bounce,
             buffers,
         })

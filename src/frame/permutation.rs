@@ -1,6 +1,6 @@
 //! Permutations of a scene's passes: the options, restricted to features of the scene and limits of the device.
 
-use super::Options;
+use super::{Options, sun_maps};
 use crate::field::silhouette::SilhouetteField;
 use crate::gpu::{Buffer, Device, TexelView};
 use crate::layout::{DeviceEntity, QUAD_FORMAT};
@@ -57,6 +57,7 @@ pub(super) fn sharp(
         sheets: merge.sheets,
         cuboids: (0..scene.entities.len()).any(|entity| scene.casts_as_box(entity) || scene.casts_as_boxes(entity)),
         globes: (0..scene.entities.len()).any(|entity| scene.is_globe(entity)),
+        sun_maps: options.baked().groups && sun_maps::has_maps(scene),
         gloss: merge.gloss,
         many_shown: merge.gloss && lights.len() > 4,
         self_shadows: buffers.has_self_shadows(),

@@ -171,6 +171,7 @@ impl Frame {
     pub(super) fn pixel_light(&self) -> Option<PixelLight<'_>> {
         let chains = self.chains.as_ref().filter(|chains| chains.is_ready())?;
         let (irradiances, _) = self.radiosity.irradiances()?;
+        let sharp = self.sharp.as_ref()?.permutation;
         self.picture.draw.evaluates_pixels().then(|| PixelLight {
             receivers: &chains.receivers,
             entities: &chains.entities,
@@ -182,6 +183,7 @@ impl Frame {
             vertices: &self.buffers.vertices,
             shown: self.kept_for_gloss().map(|[_, lights, shares]| [lights, shares]),
             irradiances,
+            sun_maps: self.sun_maps.as_ref().filter(|_| sharp.sun_maps),
         })
     }
 

@@ -6,7 +6,7 @@ use crate::field::quantity::channel_stride;
 use crate::field::sheet::{Rectangle, Sheet};
 use crate::field::sub_light::LampFace;
 use crate::field::{Fit, self_visibility};
-use crate::layout::{self, CLUSTER_VERTICES, NONE};
+use crate::layout::{self, CLUSTER_VERTICES, NONE, pack_suns};
 use crate::lists::gather::{ClusterBounds, EntityBounds, Globe, Occludes, OutlineShape, OutlineView, SceneBounds};
 use crate::lists::incremental::{Member, State};
 use crate::lists::sight::TriangleRun;
@@ -26,11 +26,15 @@ impl Frame {
         let bounds: Vec<EntityBounds> =
             bounds.chain(of_boxes().map(|(entity, number, p)| self.box_bounds(entity, number, p))).collect();
         let sun_bits = self.sun_bits(placements);
+        let sun_maps = self.sun_map_bits(placements);
         let entities = of_entities().map(|(index, p)| {
-            let [sun_bit, free_bit] = sun_bits.get(&index).copied().unwrap_or_default();
-            layout::DeviceEntity { sun_bit, free_bit, ..self.entity(index, p) }
+            let sun_bits = sun_bits.get(&index).copied().unwrap_or(0);
+            layout::DeviceEntity { sun_bits, sun_maps: sun_maps[index], ..self.entity(index, p) }
         });
-        let entities = entities.chain(of_boxes().map(|(entity, number, p)| self.box_entity(entity, number, p)));
+        let entities = entities.chain(of_boxes().map(|(entity, number, p)| layout::DeviceEntity {
+            sun_maps: sun_maps[entity],
+            ..self.box_entity(entity, number, p)
+        }));
         let white = f64::from(self.scene.data.output.white());
         let sky = (!self.scene.environment.is_none()).then_some(self.sky.brightest);
         let eps = f64::from(self.options.eps) * white;
@@ -126,17 +130,22 @@ impl Frame {
         }
     }
 
-    /// Of each sun that stands where it stood when that was baked, its bit among those that vertices tell hidden, and where
-    /// all that occludes is known also among those that they tell seen; none where something that rested has moved.
-    pub(super) fn sun_bits(&self, placements: &[Placement]) -> HashMap<usize, [u32; 2]> {
-        let stands = |(entity, stood): &(usize, Placement)| placements[*entity] == *stood;
-        if self.told_suns.is_empty() || !self.stood.iter().all(stands) {
+    /// Whether all that occludes and rested when it was baked stands where it stood.
+    pub(super) fn has_rested(&self, placements: &[Placement]) -> bool {
+        self.stood.iter().all(|(entity, stood)| placements[*entity] == *stood)
+    }
+
+    /// Of each sun that stands where it stood when that was baked, its bits of what vertices tell: the last where all that
+    /// occludes is known; none where something that rested has moved.
+    pub(super) fn sun_bits(&self, placements: &[Placement]) -> HashMap<usize, u32> {
+        if self.told_suns.is_empty() || !self.has_rested(placements) {
             return HashMap::new();
         }
         let blocks = |entity: &usize| self.scene.entities[*entity].occludes;
         let is_known = (0..self.scene.entities.len()).filter(blocks).all(|entity| self.scene.rests_opaque(entity));
-        let suns = self.told_suns.iter().enumerate().filter(|(_, sun)| stands(sun));
-        suns.map(|(place, (sun, _))| (*sun, [1 << place, u32::from(is_known) << place])).collect()
+        let suns = self.told_suns.iter().enumerate().filter(|(_, told)| placements[told.entity] == told.stood);
+        let bits = |place: usize| pack_suns(1 << place, 1 << place, u32::from(is_known) << place);
+        suns.map(|(place, told)| (told.entity, bits(place))).collect()
     }
 
     fn entity(&self, index: usize, placement: &Placement) -> layout::DeviceEntity {

@@ -262,9 +262,9 @@ impl FrameTwin<'_> {
             leaves: &|v, j, light| leaves(v, j, Some(light)),
             sees: &|v, light| {
                 let told = told_suns.as_ref().map_or(0, |told| told[v]);
-                let [sun_bit, free_bit] = sun_bits.get(&light).copied().unwrap_or_default();
-                let is_free = told >> (2 * MOST_SUNS) & free_bit != 0;
-                if told & sun_bit != 0 { Some(false) } else { is_free.then_some(true) }
+                let told = told & sun_bits.get(&light).copied().unwrap_or(0);
+                let is_free = told >> (2 * MOST_SUNS) != 0;
+                if told & ((1 << MOST_SUNS) - 1) != 0 { Some(false) } else { is_free.then_some(true) }
             },
             encloses: &|v, j, light| {
                 let is_around = |globe: &&Globe| [globe.occluder, globe.light] == [j as u32, light as u32];

@@ -122,7 +122,7 @@ impl Frame {
     }
 
     /// What varies the reflectance of an entity. Its vertices are lit by the mean.
-    fn paint(&self, index: usize) -> Option<DrawnPaint<'_>> {
+    pub(super) fn paint(&self, index: usize) -> Option<DrawnPaint<'_>> {
         let texture = self.scene.paint(index)?;
         let entity = &self.scene.entities[index];
         let opacity = self.scene.opacity(index);

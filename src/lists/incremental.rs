@@ -5,7 +5,7 @@
 //! and what keeps an entity on or off a list is that entity, the receiver and, for an occluder, a light that stands
 //! there itself. So a cluster for which none of these has changed would come to the same bits again.
 
-use crate::layout::{self, ListEntry, OWN_MAPS};
+use crate::layout::{self, DeviceEntity, ENTRY_ENTITIES, ListEntry, OWN_MAPS};
 use crate::lists::far::{self, Cut, FarRuns};
 use crate::lists::gather::{self, Candidates, ClusterBounds, GROUP_CLUSTERS, SceneBounds};
 use crate::lists::scope::Scope;
@@ -19,7 +19,7 @@ use std::ops::Range;
 pub(crate) struct State {
     pub scene_bounds: SceneBounds,
     /// The entities as shaders read them, and then the boxes of some of them.
-    pub entities: Vec<layout::DeviceEntity>,
+    pub entities: Vec<DeviceEntity>,
     /// Where the entities are; all of the above follows from this.
     pub placements: Vec<Placement>,
 }
@@ -386,10 +386,11 @@ impl ClusterLists {
                 let scope = Scope::new(&now.scene_bounds, receiver, entity, &bounds, self.near(cluster));
                 let sharp = gather::gather(&scope, &candidates, &mut entries);
                 entries.truncate(sharp);
+                let entries = without_mapped(&entries, &now.entities);
                 let has_edge = |&entry: &u32| {
                     let [entity, _] = ListEntry::entities(entry);
                     let light = &now.entities[entity as usize];
-                    !ListEntry::is_light(entry) || light.is_spot() || scope.may_be_at(light)
+                    !ListEntry::is_light(entry) || light.is_spot() || light.sun_maps != 0 || scope.may_be_at(light)
                 };
                 if entries.iter().any(has_edge) { entries } else { Vec::new() }
             };
@@ -464,4 +465,21 @@ impl<'b> Moved<'b> {
         };
         on(&self.before.scene_bounds) || on(&now.scene_bounds)
     }
+}
+
+/// Chains of sharp lights less the occluders that stand in the maps of these lights.
+fn without_mapped(entries: &[u32], entities: &[DeviceEntity]) -> Vec<u32> {
+    let mut kept = Vec::with_capacity(entries.len());
+    let mut occluders = 0;
+    for &entry in entries {
+        let [entity, light] = ListEntry::entities(entry);
+        if ListEntry::is_light(entry) {
+            kept.push(entry & !ENTRY_ENTITIES | occluders);
+            occluders = 0;
+        } else if entities[entity as usize].sun_maps & entities[light as usize].sun_maps == 0 {
+            kept.push(entry);
+            occluders += 1;
+        }
+    }
+    kept
 }

@@ -57,6 +57,24 @@ const CONE_WIDER: f64 = 1.12;
 /// from a light. With 1.1 no pixel changes, with 1.06 by 0.0009 of the brightest.
 const BALL_WIDER: f64 = 1.15;
 
+/// Lookups in the map of a sun that find what hides it, and those that find how much of it is hidden.
+const SEEKING_TAPS: u32 = 16;
+const BLURRING_TAPS: u32 = 24;
+/// How far above a surface something must stand that casts a shadow on it, in texels of the map: above a flat one, and
+/// above one that stands for something round, whose vertices have other normals.
+const FLAT_BIAS: f64 = 0.1;
+const ROUND_BIAS: f64 = 1.0;
+/// Least cosine between the normals of a flat triangle and of its vertices.
+const FLAT: f64 = 0.9995;
+/// Radius of the least blur of a shadow's edge, in texels of the map; twice that where what casts it touches the surface.
+const LEAST_BLUR: f64 = 0.75;
+/// Share of a sun up to which nothing of it is seen where what hides it touches the surface: half a texel beside the edge.
+const DARKENED: f64 = 0.7;
+/// How far above a surface something stands that touches it, in texels; at twice as many it does not.
+const TOUCHING_TEXELS: f64 = 8.0;
+/// Least cosine to the sun by which a surface's plane is steep.
+const LEAST_FACING: f64 = 0.02;
+
 /// A permutation of the shader.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SharpPermutation {
@@ -82,6 +100,8 @@ pub struct SharpPermutation {
     pub cuboids: bool,
     /// Whether anything may be a globe of glass around a lamp.
     pub globes: bool,
+    /// Whether suns have maps of what rests.
+    pub sun_maps: bool,
     /// Whether any lit mesh can shadow itself.
     pub self_shadows: bool,
     /// Whether the shares of lights whose highlights are shown are kept.
@@ -116,7 +136,7 @@ impl SharpPermutation {
 
     /// A fragment shader that shows highlights of sharp lights, whose shadows it is given.
     pub fn highlight_row(&self, row: ShaderPermutation) -> ShaderPermutation {
-        SharpPermutation { self_shadows: false, edges: false, gloss: false, ..*self }.on_pixels(row)
+        SharpPermutation { self_shadows: false, edges: false, gloss: false, sun_maps: false, ..*self }.on_pixels(row)
     }
 
     fn on_pixels(self, row: ShaderPermutation) -> ShaderPermutation {
@@ -141,6 +161,9 @@ impl SharpPermutation {
             .define("SHEETS", self.sheets)
             .define("CUBOIDS", self.cuboids)
             .define("GLOBES", self.globes)
+            .define("SUN_MAPS", self.sun_maps)
+            .define("SEEKING_TAPS", SEEKING_TAPS)
+            .define("BLURRING_TAPS", BLURRING_TAPS)
             .define("SELF", self.self_shadows)
             .define("EDGES", self.edges)
             .define("SHOWN", self.gloss)
@@ -166,6 +189,13 @@ impl SharpPermutation {
             ("MOST_STEPS", MOST_STEPS),
             ("BLENDED_MISS", BLENDED_MISS),
             ("MOST_MISS", MOST_MISS),
+            ("FLAT", FLAT),
+            ("FLAT_BIAS", FLAT_BIAS),
+            ("ROUND_BIAS", ROUND_BIAS),
+            ("LEAST_BLUR", LEAST_BLUR),
+            ("DARKENED", DARKENED),
+            ("TOUCHING_TEXELS", TOUCHING_TEXELS),
+            ("LEAST_FACING", LEAST_FACING),
             ("NEAR_LIGHT", (NEAR_LIGHT_STEPS / EDGE_STEPS).powi(2)),
             ("MOST_SINE", MOST_SINE),
             ("LIMIT_SINE", LIMIT_SINE),

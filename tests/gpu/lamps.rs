@@ -253,6 +253,38 @@ sun = { toward = [0.5, 0.8, -0.4], angle_deg = 1, radiance = [6000, 6000, 6000] 
     assert!(error < 0.04, "{error}");
 }
 
+/// The sun falls through the window of a round tower of one mesh and past thin rods: its patch on the wall across has the
+/// window's edges and the rods' shadows, which were as fine as the wall's vertices (0.36).
+#[test]
+fn a_round_tower_has_a_patch_of_sunlight() {
+    let Some(gpu) = gpu() else { return };
+    let place = |i: u32, y: f32| {
+        let (sin, cos) = (TAU * i as f32 / 24.0).sin_cos();
+        Vec3::new(2.0 * cos, y, 2.0 * sin)
+    };
+    let heights = [0.0, 1.5, 2.5, 3.0];
+    let rows = heights.iter().zip(&heights[1..]);
+    let wall = rows.flat_map(|(&low, &high)| {
+        let is_window = move |i: &u32| low == 1.5 && [0, 23].contains(i);
+        (0..24)
+            .filter(move |i| !is_window(i))
+            .flat_map(move |i| [place(i, low), place(i + 1, low), place(i + 1, high), place(i, high)])
+    });
+    let wall: Vec<Vec3> = wall.collect();
+    let rod = |z: f32| [[0.0, z], [0.0, z + 0.04], [3.0, z + 0.04], [3.0, z]].map(|[y, z]| Vec3::new(1.2, y, z));
+    let rods: Vec<Vec3> = [-0.4, -0.2, 0.0, 0.2, 0.4].into_iter().flat_map(rod).collect();
+    let sky = r#"sun = { toward = [1, 0.35, 0.05], angle_deg = 0.6, radiance = [9000, 9000, 9000] }"#;
+    let scene = Scene::builder()
+        .camera(Camera { fov_deg: 60.0, ..Camera::new([0.5, 1.4, 0.0], [-2.0, 0.9, 0.0]) })
+        .environment(toml::from_str(sky).unwrap())
+        .mesh("tower", of_quads("tower", wall))
+        .mesh("rods", of_quads("rods", rods))
+        .entity(EntityData::of_mesh("tower"))
+        .entity(EntityData::of_mesh("rods"));
+    let error = picture_error(&gpu, &scene.build().unwrap());
+    assert!(error < 0.1, "{error}");
+}
+
 /// A vault of one sheet ends in a wall that is higher: below the vault no sun comes in along the line where they meet
 /// (0.55).
 #[test]

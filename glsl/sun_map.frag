@@ -1,0 +1,19 @@
+#version 460
+// Keeps how near to the sun a surface is.
+layout(location = 0) out float height;
+#if HOLES
+layout(location = 0) in vec2 uv;
+layout(binding = 0) uniform sampler2D picture;
+#include "holes.glsl"
+layout(push_constant) uniform Push {
+    mat4 clip_from_object;
+    float alpha_cutoff;
+} push;
+#endif
+
+void main() {
+#if HOLES
+    cut_holes(texture(picture, uv).a, push.alpha_cutoff);
+#endif
+    height = gl_FragCoord.z;
+}

@@ -254,7 +254,7 @@ sun = { toward = [0.5, 0.8, -0.4], angle_deg = 1, radiance = [6000, 6000, 6000] 
 }
 
 /// The sun falls through the window of a round tower of one mesh and past thin rods: its patch on the wall across has the
-/// window's edges and the rods' shadows, which were as fine as the wall's vertices (0.36).
+/// window's edges and the rods' shadows, which were as fine as the wall's vertices (0.34).
 #[test]
 fn a_round_tower_has_a_patch_of_sunlight() {
     let Some(gpu) = gpu() else { return };

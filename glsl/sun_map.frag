@@ -5,10 +5,7 @@ layout(location = 0) out float height;
 layout(location = 0) in vec2 uv;
 layout(binding = 0) uniform sampler2D picture;
 #include "holes.glsl"
-layout(push_constant) uniform Push {
-    mat4 clip_from_object;
-    float alpha_cutoff;
-} push;
+#include "sun_map_push.glsl"
 #endif
 
 void main() {

@@ -5,11 +5,7 @@ layout(location = 0) in vec3 position;
 layout(location = 1) in vec3 paint; // texture coordinates and tint
 layout(location = 0) out vec2 uv;
 #endif
-
-layout(push_constant) uniform Push {
-    mat4 clip_from_object;
-    float alpha_cutoff;
-} push;
+#include "sun_map_push.glsl"
 
 void main() {
 #if HOLES

@@ -11,10 +11,14 @@ use glam::DVec3;
 /// Share of a sheet's longer side that something may reach below it.
 const BELOW: f64 = 1e-3;
 
+/// Whether an entity stands in maps.
+fn is_mapped(scene: &Scene, entity: usize) -> bool {
+    scene.entities[entity].occludes && scene.rests_opaque(entity)
+}
+
 /// Whether a scene has suns that have maps, and anything that these hold.
 pub(super) fn has_maps(scene: &Scene) -> bool {
-    let casts = |entity: usize| scene.entities[entity].occludes && scene.rests_opaque(entity);
-    crisp_suns(scene).next().is_some() && (0..scene.data.entities.len()).any(casts)
+    crisp_suns(scene).next().is_some() && (0..scene.entities.len()).any(|entity| is_mapped(scene, entity))
 }
 
 /// A sun of which vertices tell whether it is hidden.
@@ -26,11 +30,6 @@ pub(super) struct ToldSun {
 }
 
 impl Frame {
-    /// Whether an entity stands in maps.
-    fn is_mapped(&self, entity: usize) -> bool {
-        self.scene.entities.get(entity).is_some_and(|found| found.occludes) && self.scene.rests_opaque(entity)
-    }
-
     /// Draws the maps once any pixels evaluate lights.
     pub(super) fn fit_sun_maps(&mut self) -> Result<()> {
         let wanted = self.sharp.as_ref().is_some_and(|sharp| sharp.permutation.sun_maps) && self.wants_edges();
@@ -47,7 +46,8 @@ impl Frame {
 
     /// What may cast shadows on anything: all that rests but the ground.
     fn casters(&self) -> Vec<MapCaster<'_>> {
-        let mapped: Vec<&(usize, Placement)> = self.stood.iter().filter(|(index, _)| self.is_mapped(*index)).collect();
+        let mapped: Vec<&(usize, Placement)> =
+            self.stood.iter().filter(|(index, _)| is_mapped(&self.scene, *index)).collect();
         let caster = |(index, placement): &(usize, Placement)| {
             let device_mesh = &self.buffers.meshes[self.scene.entities[*index].mesh];
             let corner = |k: usize| {
@@ -97,7 +97,7 @@ impl Frame {
                 all |= 1 << place;
             }
         }
-        (0..bits.len()).filter(|&entity| self.is_mapped(entity)).for_each(|entity| bits[entity] |= all);
+        (0..bits.len()).filter(|&entity| is_mapped(&self.scene, entity)).for_each(|entity| bits[entity] |= all);
         bits
     }
 }

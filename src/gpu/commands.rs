@@ -210,8 +210,8 @@ impl<'r> Commands<'r> {
         if groups.contains(&0) {
             return Ok(());
         }
-        self.bind(&pipeline.layout, &pipeline.name, vk::PipelineBindPoint::COMPUTE, resources)?;
-        self.push(&pipeline.layout, &pipeline.name, push);
+        self.bind(pipeline.layout(), &pipeline.name, vk::PipelineBindPoint::COMPUTE, resources)?;
+        self.push(pipeline.layout(), &pipeline.name, push);
         let (handle, buffer) = self.raw();
         // SAFETY: pipeline and resources are borrowed until the commands have run; limits were checked above.
         unsafe {
@@ -229,8 +229,8 @@ impl<'r> Commands<'r> {
         push: &P,
         groups: (&'r Buffer, u64),
     ) -> Result<()> {
-        self.bind(&pipeline.layout, &pipeline.name, vk::PipelineBindPoint::COMPUTE, resources)?;
-        self.push(&pipeline.layout, &pipeline.name, push);
+        self.bind(pipeline.layout(), &pipeline.name, vk::PipelineBindPoint::COMPUTE, resources)?;
+        self.push(pipeline.layout(), &pipeline.name, push);
         let (buffer, offset) = groups;
         let pass = self.pass_name();
         self.tracker.use_range(buffer.id, &buffer.name, offset..offset + 12, Access::Indirect, &pass);

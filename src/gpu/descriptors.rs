@@ -57,7 +57,7 @@ impl<'r> Commands<'r> {
             let bytes = &bytes[..layout.push_bytes as usize];
             let (handle, buffer) = self.raw();
             // SAFETY: size and stages are the layout's own.
-            unsafe { handle.cmd_push_constants(buffer, layout.pipeline.handle, layout.push_stages, 0, bytes) };
+            unsafe { handle.cmd_push_constants(buffer, layout.pipeline, layout.push_stages, 0, bytes) };
         }
     }
 
@@ -137,7 +137,7 @@ impl<'r> Commands<'r> {
         }
         let (handle, buffer) = self.raw();
         // SAFETY: the command buffer is recording and the set matches the layout.
-        unsafe { handle.cmd_bind_descriptor_sets(buffer, point, layout.pipeline.handle, 0, &[set], &[]) };
+        unsafe { handle.cmd_bind_descriptor_sets(buffer, point, layout.pipeline, 0, &[set], &[]) };
         Ok(())
     }
 
@@ -190,7 +190,7 @@ impl<'r> Commands<'r> {
         }
         let (pool, used) = self.recording.descriptors.last_mut().expect("a pool was just made");
         *used += 1;
-        let layouts = [layout.set.handle];
+        let layouts = [layout.set];
         let allocate = vk::DescriptorSetAllocateInfo::default().descriptor_pool(*pool).set_layouts(&layouts);
         // SAFETY: the pool has room (counted); freed with it.
         let sets = unsafe { handle.allocate_descriptor_sets(&allocate) }

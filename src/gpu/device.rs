@@ -2,15 +2,17 @@
 
 use super::Checked;
 use super::instance::{Instance, OwnInstance};
+use super::pipeline::Kept;
 use super::select::{Candidate, choose, physical_devices, queue_family};
 use super::shader::{sealed, unsealed};
 use super::validation::Validation;
 use crate::error::Result;
 use ash::vk;
+use std::collections::HashMap;
 use std::ffi::{CStr, CString};
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicU64, AtomicUsize, Ordering};
-use std::sync::{Arc, Mutex};
+use std::sync::{Arc, Mutex, PoisonError};
 
 /// The caller's choices for a device.
 #[derive(Clone, Debug, Default)]
@@ -52,6 +54,8 @@ pub struct Device {
     pub(super) memory: vk::PhysicalDeviceMemoryProperties,
     pub(super) names: Option<ash::ext::debug_utils::Device>,
     pub(super) pipeline_cache: vk::PipelineCache,
+    /// By the hash of all that they are made of.
+    pub(super) pipelines: Mutex<HashMap<[u8; 32], Arc<Kept>>>,
     pipeline_key: String,
     pub limits: vk::PhysicalDeviceLimits,
     pub info: Candidate,
@@ -139,6 +143,7 @@ impl Device {
             memory,
             names,
             pipeline_cache: vk::PipelineCache::null(),
+            pipelines: Mutex::default(),
             pipeline_key: pipeline_key(&properties),
             limits: properties.limits,
             info,
@@ -240,6 +245,8 @@ impl Drop for Device {
             if !self.is_shared {
                 let _ = self.handle.device_wait_idle();
             }
+            let pipelines = std::mem::take(self.pipelines.get_mut().unwrap_or_else(PoisonError::into_inner));
+            pipelines.values().for_each(|kept| kept.destroy(self));
             self.handle.destroy_pipeline_cache(self.pipeline_cache, None);
             if !self.is_shared {
                 self.handle.destroy_device(None);

@@ -138,8 +138,8 @@ impl<'r> Drawing<'_, 'r> {
     /// `resources` are images that its fragment shader reads, at their binding numbers.
     pub fn screen<P: Pod>(&mut self, pipeline: &'r GraphicsPipeline, resources: &[Bind<'r>], push: &P) -> Result<()> {
         assert!(pipeline.inputs.is_empty(), "{}: makes its own vertices", pipeline.name);
-        self.commands.bind(&pipeline.layout, &pipeline.name, vk::PipelineBindPoint::GRAPHICS, resources)?;
-        self.commands.push(&pipeline.layout, &pipeline.name, push);
+        self.commands.bind(pipeline.layout(), &pipeline.name, vk::PipelineBindPoint::GRAPHICS, resources)?;
+        self.commands.push(pipeline.layout(), &pipeline.name, push);
         let (handle, buffer) = self.commands.raw();
         // SAFETY: pipeline and resources are borrowed until the commands are submitted; the vertex shader reads no
         // buffer.
@@ -154,7 +154,7 @@ impl<'r> Drawing<'_, 'r> {
     /// Binds images that the bound pipeline's fragment shader reads, at their binding numbers.
     pub fn resources(&mut self, resources: &[Bind<'r>]) -> Result<()> {
         let pipeline = self.pipeline.expect("a pipeline is bound before its resources");
-        self.commands.bind(&pipeline.layout, &pipeline.name, vk::PipelineBindPoint::GRAPHICS, resources)
+        self.commands.bind(pipeline.layout(), &pipeline.name, vk::PipelineBindPoint::GRAPHICS, resources)
     }
 
     /// Sets viewport and scissor to a rectangle in pixels: left, top, width and height.
@@ -185,7 +185,7 @@ impl<'r> Drawing<'_, 'r> {
     /// Sets the bound pipeline's push constants.
     pub fn push<P: Pod>(&mut self, push: &P) {
         let pipeline = self.pipeline.expect("a pipeline is bound before its push constants");
-        self.commands.push(&pipeline.layout, &pipeline.name, push);
+        self.commands.push(pipeline.layout(), &pipeline.name, push);
     }
 
     /// Draws the triangles of a range of corners, three a triangle, with a pipeline whose vertex shader finds corner

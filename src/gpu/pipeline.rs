@@ -1,27 +1,29 @@
-//! Pipelines and their layouts, built from the reflection of their shaders.
+//! Pipelines and their layouts, built from the reflection of their shaders. A device keeps each until it ends: another frame
+//! of the same shaders waits for no driver.
 
 use super::Checked;
 use super::device::Device;
-use super::owned::Owned;
 use super::reflect::{Binding, VertexInput};
 use super::shader::{Shader, Stage};
 use crate::error::{Error, Result};
 use ash::vk;
 use log::Level;
-use std::sync::Arc;
+use std::collections::hash_map::Entry;
+use std::sync::{Arc, PoisonError};
 use std::time::Instant;
 
 /// Descriptor set layout and pipeline layout, used by both kinds of pipeline.
 pub(super) struct Layout {
-    pub(super) pipeline: Owned<vk::PipelineLayout>,
-    pub(super) set: Owned<vk::DescriptorSetLayout>,
+    pub(super) pipeline: vk::PipelineLayout,
+    pub(super) set: vk::DescriptorSetLayout,
     pub(super) bindings: Vec<Binding>,
     pub(super) push_bytes: u32,
     pub(super) push_stages: vk::ShaderStageFlags,
 }
 
 impl Layout {
-    fn new(device: &Arc<Device>, name: &str, shaders: &[&Shader]) -> Result<Self> {
+    /// To be destroyed.
+    fn new(device: &Device, name: &str, shaders: &[&Shader]) -> Result<Self> {
         let mut bindings: Vec<Binding> = Vec::new();
         for binding in shaders.iter().flat_map(|s| &s.reflection.bindings) {
             if !bindings.iter().any(|b| b.index == binding.index) {
@@ -42,25 +44,85 @@ impl Layout {
             })
             .collect();
         let create = vk::DescriptorSetLayoutCreateInfo::default().bindings(&descriptions);
-        // SAFETY: destroyed by `Owned`.
+        // SAFETY: destroyed with what is returned, or below.
         let set = unsafe { device.handle.create_descriptor_set_layout(&create, None) }
             .checked("vkCreateDescriptorSetLayout", name)?;
-        let set = Owned::new(device, name, set, ash::Device::destroy_descriptor_set_layout);
+        device.name(set, name);
         let push_bytes = shaders.iter().map(|s| s.reflection.push_bytes).max().unwrap_or(0);
         let push_stages = shaders
             .iter()
             .filter(|s| s.reflection.push_bytes > 0)
             .fold(vk::ShaderStageFlags::empty(), |all, s| all | stage_flag(s.stage));
-        let sets = [set.handle];
+        let sets = [set];
         let ranges = [vk::PushConstantRange { stage_flags: push_stages, offset: 0, size: push_bytes }];
         let create = vk::PipelineLayoutCreateInfo::default()
             .set_layouts(&sets)
             .push_constant_ranges(if push_bytes > 0 { &ranges } else { &[] });
-        // SAFETY: destroyed by `Owned`.
+        // SAFETY: destroyed with what is returned.
         let pipeline =
-            unsafe { device.handle.create_pipeline_layout(&create, None) }.checked("vkCreatePipelineLayout", name)?;
-        let pipeline = Owned::new(device, name, pipeline, ash::Device::destroy_pipeline_layout);
-        Ok(Layout { pipeline, set, bindings, push_bytes, push_stages })
+            unsafe { device.handle.create_pipeline_layout(&create, None) }.checked("vkCreatePipelineLayout", name);
+        let mut layout = Layout { pipeline: vk::PipelineLayout::null(), set, bindings, push_bytes, push_stages };
+        layout.pipeline = pipeline.inspect_err(|_| layout.destroy(device))?;
+        device.name(layout.pipeline, name);
+        Ok(layout)
+    }
+
+    fn destroy(&self, device: &Device) {
+        // SAFETY: no submission is under way that uses them; a handle that is null is passed over.
+        unsafe {
+            device.handle.destroy_pipeline_layout(self.pipeline, None);
+            device.handle.destroy_descriptor_set_layout(self.set, None);
+        }
+    }
+}
+
+/// A pipeline that a device keeps.
+pub(super) struct Kept {
+    handle: vk::Pipeline,
+    layout: Layout,
+}
+
+impl Kept {
+    /// The pipeline of these shaders that `device` keeps, or the one that `make` makes of them.
+    fn of(
+        device: &Device,
+        name: &str,
+        shaders: &[&Shader],
+        state: &str,
+        make: impl FnOnce(&Layout) -> Result<Vec<vk::Pipeline>>,
+    ) -> Result<Arc<Self>> {
+        let mut hasher = blake3::Hasher::new();
+        hasher.update(state.as_bytes());
+        shaders.iter().for_each(|shader| {
+            hasher.update(&(shader.spirv.len() as u64).to_le_bytes());
+            hasher.update(bytemuck::cast_slice(&shader.spirv));
+        });
+        let key = *hasher.finalize().as_bytes();
+        let kept = || device.pipelines.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(found) = kept().get(&key) {
+            return Ok(found.clone());
+        }
+        let layout = Layout::new(device, name, shaders)?;
+        let start = Instant::now();
+        let handle = make(&layout).inspect_err(|_| layout.destroy(device))?[0];
+        let ms = start.elapsed().as_secs_f64() * 1e3;
+        log::log!(if ms < LEAST_TOLD_MS { Level::Trace } else { Level::Debug }, "pipeline {name}: {ms:.0} ms");
+        device.name(handle, name);
+        match kept().entry(key) {
+            Entry::Vacant(place) => Ok(place.insert(Arc::new(Kept { handle, layout })).clone()),
+            // Another thread was quicker.
+            Entry::Occupied(place) => {
+                Kept { handle, layout }.destroy(device);
+                Ok(place.get().clone())
+            }
+        }
+    }
+
+    /// No submission may be under way that uses it.
+    pub(super) fn destroy(&self, device: &Device) {
+        // SAFETY: as the caller says.
+        unsafe { device.handle.destroy_pipeline(self.handle, None) };
+        self.layout.destroy(device);
     }
 }
 
@@ -113,46 +175,39 @@ impl Drop for Module<'_> {
 /// Pipelines that are made in less time are many, and only traced.
 const LEAST_TOLD_MS: f64 = 5.0;
 
-/// What `made` gives, with a line in the log of how long the driver took for it.
-fn timed<T>(name: &str, made: impl FnOnce() -> T) -> T {
-    let start = Instant::now();
-    let outcome = made();
-    let ms = start.elapsed().as_secs_f64() * 1e3;
-    log::log!(if ms < LEAST_TOLD_MS { Level::Trace } else { Level::Debug }, "pipeline {name}: {ms:.0} ms");
-    outcome
-}
-
 /// One compute shader, ready to dispatch.
 pub struct ComputePipeline {
-    /// Before its layout.
-    handle: Owned<vk::Pipeline>,
-    pub(super) layout: Layout,
+    kept: Arc<Kept>,
+    /// Keeps it.
+    _device: Arc<Device>,
     pub local_size: [u32; 3],
     pub name: String,
 }
 
 impl ComputePipeline {
     pub fn new(device: &Arc<Device>, name: &str, shader: &Shader) -> Result<Self> {
-        let layout = Layout::new(device, name, &[shader])?;
-        let local_size = shader.reflection.local_size;
         let module = Module::new(device, shader)?;
         let stage = vk::PipelineShaderStageCreateInfo::default()
             .stage(vk::ShaderStageFlags::COMPUTE)
             .module(module.1)
             .name(c"main");
-        let create = vk::ComputePipelineCreateInfo::default().stage(stage).layout(layout.pipeline.handle);
-        let handle = timed(name, || {
-            // SAFETY: everything that `create` points to outlives the call; destroyed by `Owned`.
+        let kept = Kept::of(device, name, &[shader], "", |layout| {
+            let create = vk::ComputePipelineCreateInfo::default().stage(stage).layout(layout.pipeline);
+            // SAFETY: everything that `create` points to outlives the call; destroyed by `Kept`.
             unsafe { device.handle.create_compute_pipelines(device.pipeline_cache, &[create], None) }
                 .map_err(|(_, code)| code)
                 .checked("vkCreateComputePipelines", name)
-        })?[0];
-        let handle = Owned::new(device, name, handle, ash::Device::destroy_pipeline);
-        Ok(ComputePipeline { handle, layout, local_size, name: name.into() })
+        })?;
+        let local_size = shader.reflection.local_size;
+        Ok(ComputePipeline { kept, _device: device.clone(), local_size, name: name.into() })
     }
 
     pub(super) fn raw(&self) -> vk::Pipeline {
-        self.handle.handle
+        self.kept.handle
+    }
+
+    pub(super) fn layout(&self) -> &Layout {
+        &self.kept.layout
     }
 }
 
@@ -190,9 +245,9 @@ impl GraphicsState {
 /// A vertex and a fragment shader, ready to draw indexed triangles. Vertex input `location` reads tightly packed floats
 /// from the vertex buffer bound at the same number.
 pub struct GraphicsPipeline {
-    /// Before its layout.
-    handle: Owned<vk::Pipeline>,
-    pub(super) layout: Layout,
+    kept: Arc<Kept>,
+    /// Keeps it.
+    _device: Arc<Device>,
     pub(super) inputs: Vec<VertexInput>,
     pub name: String,
 }
@@ -205,7 +260,6 @@ impl GraphicsPipeline {
         fragment: &Shader,
         state: GraphicsState,
     ) -> Result<Self> {
-        let layout = Layout::new(device, name, &[vertex, fragment])?;
         let modules = [Module::new(device, vertex)?, Module::new(device, fragment)?];
         let stages = [(vk::ShaderStageFlags::VERTEX, modules[0].1), (vk::ShaderStageFlags::FRAGMENT, modules[1].1)]
             .map(|(stage, module)| {
@@ -250,20 +304,23 @@ impl GraphicsPipeline {
             .depth_stencil_state(&depth)
             .color_blend_state(&blend)
             .dynamic_state(&dynamic)
-            .layout(layout.pipeline.handle)
             .push_next(&mut rendering);
-        let handle = timed(name, || {
-            // SAFETY: everything that `create` points to outlives the call; destroyed by `Owned`.
+        let kept = Kept::of(device, name, &[vertex, fragment], &format!("{state:?}"), |layout| {
+            let create = create.layout(layout.pipeline);
+            // SAFETY: everything that `create` points to outlives the call; destroyed by `Kept`.
             unsafe { device.handle.create_graphics_pipelines(device.pipeline_cache, &[create], None) }
                 .map_err(|(_, code)| code)
                 .checked("vkCreateGraphicsPipelines", name)
-        })?[0];
-        let handle = Owned::new(device, name, handle, ash::Device::destroy_pipeline);
-        Ok(GraphicsPipeline { handle, layout, inputs, name: name.into() })
+        })?;
+        Ok(GraphicsPipeline { kept, _device: device.clone(), inputs, name: name.into() })
     }
 
     pub(super) fn raw(&self) -> vk::Pipeline {
-        self.handle.handle
+        self.kept.handle
+    }
+
+    pub(super) fn layout(&self) -> &Layout {
+        &self.kept.layout
     }
 }
 

@@ -52,19 +52,30 @@ pub struct Shader {
 
 impl Shader {
     /// Compiles `source`, or reads the words from `cache_dir` if the same source, includes and defines were compiled by
-    /// the same compiler before. Without a folder the process keeps what it compiles: one bake after another asks for the
+    /// the same compiler before. The process keeps what it compiles or reads: one frame or bake after another asks for the
     /// same.
     pub fn compile(source: &ShaderSource<'_>, cache_dir: Option<&Path>) -> Result<Self> {
         static COMPILED: Mutex<BTreeMap<String, Shader>> = Mutex::new(BTreeMap::new());
         let compiled = || COMPILED.lock().unwrap_or_else(PoisonError::into_inner);
         let includes = gather(source.name, &source.text, source.include)?;
         let key = key(source, &includes);
-        if let Some(shader) = compiled().get(&key).filter(|_| cache_dir.is_none()) {
+        if let Some(shader) = compiled().get(&key) {
             return Ok(shader.clone());
         }
+        let shader = Self::cached(source, &includes, &key, cache_dir)?;
+        compiled().insert(key, shader.clone());
+        Ok(shader)
+    }
+
+    fn cached(
+        source: &ShaderSource<'_>,
+        includes: &BTreeMap<String, String>,
+        key: &str,
+        cache_dir: Option<&Path>,
+    ) -> Result<Self> {
         let path = cache_dir.map(|folder| folder.join("spirv").join(format!("{key}.spv")));
         let file = path.as_ref().and_then(|path| crate::files::read(path).ok()).unwrap_or_default();
-        let cached = unsealed(&key, &file).filter(|bytes| bytes.len() % 4 == 0);
+        let cached = unsealed(key, &file).filter(|bytes| bytes.len() % 4 == 0);
         let word = |bytes: &[u8]| u32::from_ne_bytes(bytes.try_into().expect("four bytes"));
         let cached = cached.map(|bytes| bytes.chunks_exact(4).map(word).collect());
         let shader = |spirv: Vec<u32>| -> Result<Self> {
@@ -76,17 +87,13 @@ impl Shader {
             return Ok(found);
         }
         compiling::begins(source.name);
-        let spirv = compile(source, &includes)?;
+        let spirv = compile(source, includes)?;
         if let Some(path) = path
-            && let Err(error) = crate::files::replace(&path, &sealed(&key, bytemuck::cast_slice(&spirv)))
+            && let Err(error) = crate::files::replace(&path, &sealed(key, bytemuck::cast_slice(&spirv)))
         {
             log::warn!("{}: the compiled shader was not saved: {error}", path.display());
         }
-        let shader = shader(spirv)?;
-        if cache_dir.is_none() {
-            compiled().insert(key, shader.clone());
-        }
-        Ok(shader)
+        shader(spirv)
     }
 }
 
@@ -200,6 +207,12 @@ mod tests {
         ShaderSource { name: "test.comp", stage: Stage::Compute, text: TEXT.into(), defines, optimised: false, include }
     }
 
+    /// As another process finds it.
+    fn from_disk(source: &ShaderSource<'_>, folder: &Path) -> Vec<u32> {
+        let includes = gather(source.name, &source.text, source.include).unwrap();
+        Shader::cached(source, &includes, &key(source, &includes), Some(folder)).unwrap().spirv
+    }
+
     #[test]
     fn cache_key_sees_includes_and_defines_and_damage_is_compiled_anew() {
         let folder = tempfile::tempdir().unwrap();
@@ -207,7 +220,7 @@ mod tests {
         let two = |name: &str| (name == "a.glsl").then(|| "const float A = 2.0;\n".to_owned());
         let b = |value: &str| vec![("B".to_owned(), value.to_owned())];
         let compile = |include: &dyn Fn(&str) -> Option<String>, defines: &[(String, String)]| {
-            Shader::compile(&source(include, defines), Some(folder.path())).unwrap().spirv
+            from_disk(&source(include, defines), folder.path())
         };
         let first = compile(&one, &b("3"));
         let files =
@@ -233,7 +246,7 @@ mod tests {
         let include = |_: &str| Some("const float A = 1.0;\n".to_owned());
         let compile = |value: &str| {
             let defines = [("B".to_owned(), value.to_owned())];
-            Shader::compile(&source(&include, &defines), Some(folder.path())).unwrap().spirv
+            from_disk(&source(&include, &defines), folder.path())
         };
         let compiled = ["3", "4"].map(compile);
         assert_ne!(compiled[0], compiled[1]);

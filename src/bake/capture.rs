@@ -276,6 +276,17 @@ pub fn twin_colors(
     nearest.into_iter().map(|(_, color)| color).collect()
 }
 
+/// The rows or columns of a face in which rays may meet a triangle, by one coordinate of its corners and their depths.
+fn reach(sides: [f64; 3], depths: [f64; 3], px: usize) -> Range<usize> {
+    if depths.iter().any(|depth| *depth <= 0.0) {
+        return 0..px;
+    }
+    let texels = [0, 1, 2].map(|corner| 0.5 * (sides[corner] / depths[corner] + 1.0) * px as f64);
+    let first = texels.into_iter().fold(f64::INFINITY, f64::min) - 1.0;
+    let end = texels.into_iter().fold(f64::NEG_INFINITY, f64::max) + 1.0;
+    (first.max(0.0) as usize).min(px)..(end.max(0.0) as usize).min(px)
+}
+
 /// Calls a function for every ray and triangle that meet: with the distance in units of the ray's (s, t, 1), and with
 /// the point's weights among the triangle's corners.
 fn rays(
@@ -294,12 +305,16 @@ fn rays(
             let q = positions[i as usize].as_dvec3() - eye;
             DVec3::new(q.dot(right), q.dot(down), q.dot(forward))
         });
+        let depths = [a.z, b.z, c.z];
+        if depths.iter().all(|depth| *depth <= 0.0) {
+            continue;
+        }
         // A ray hits when it lies on the same side of the three planes through the eye and an edge, and in front.
         let edges = [b.cross(c), c.cross(a), a.cross(b)];
         let plane = (b - a).cross(c - a);
         let offset = plane.dot(a);
-        for y in 0..px {
-            for x in 0..px {
+        for y in reach([a.y, b.y, c.y], depths, px) {
+            for x in reach([a.x, b.x, c.x], depths, px) {
                 let ray = DVec3::new(texel_st(x, px), texel_st(y, px), 1.0);
                 let sides = edges.map(|edge| edge.dot(ray));
                 let same = sides.iter().all(|s| *s >= 0.0) || sides.iter().all(|s| *s <= 0.0);

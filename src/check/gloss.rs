@@ -13,11 +13,12 @@ use crate::scene::Gloss;
 /// Filters of textures have eight bits between two texels, and texels of eleven bits.
 const FILTERED: f64 = 0.01;
 
-/// Compares what every vertex of a scene reflects at three roughnesses: of a mirror, whose pixels look the sky up, and
-/// of two rougher ones; of the sky, and of what stands near.
+/// Compares what every vertex of a scene reflects, of the sky and of what stands near: of a mirror, whose pixels look the
+/// sky up, and of rougher ones.
 pub fn rows(baker: &Baker, add: &mut dyn FnMut(CheckRow)) -> Result<()> {
     let mut scene = scene(MIXED)?;
-    for (roughness, bounces) in [0.2, 0.5, 1.0].into_iter().flat_map(|r| [(r, Bounces::None), (r, Bounces::One)]) {
+    let trials = [(0.2, Bounces::None), (1.0, Bounces::None), (0.2, Bounces::One), (0.5, Bounces::One)];
+    for (roughness, bounces) in trials {
         for index in 0..scene.data.entities.len() {
             let gloss = Gloss { roughness, metallic: 0.5, f0: 0.04 };
             let data = crate::scene::EntityData { gloss: Some(gloss), ..scene.data.entities[index].clone() };

@@ -189,7 +189,7 @@ fn devices_lists_the_one_that_is_taken() {
 #[test]
 fn demo_writes_pictures_and_a_table() {
     let Some(folder) = Folder::with_device() else { return };
-    let ran = folder.good("demo --timed-frames 1 --size 96x64 -o made/out");
+    let ran = folder.good("demo --timed-frames 1 --size 96x64 --quality draft -o made/out");
     let scenes = [
         "room",
         "sphere_over_plane",

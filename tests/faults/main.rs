@@ -118,7 +118,7 @@ impl Place {
 
 #[test]
 fn faults_in_some_of_all_calls_are_survived() {
-    let share = std::env::var("FAULTS_SHARE").map_or(10, |text| text.parse().expect("a number"));
+    let share = std::env::var("FAULTS_SHARE").map_or(20, |text| text.parse().expect("a number"));
     let Some(place) = Place::new() else { return };
     let count: usize = JOBS.iter().map(|job| job.sweep(place.path(), share)).sum();
     assert!(count > 20, "hardly anything failed: {count}");

@@ -118,9 +118,7 @@ fn highlights_and_reflections_are_those_of_rays() {
     ];
     let mut lines = Vec::new();
     for (name, around) in &around {
-        for (roughness, of_lights, of_floors) in
-            [(0.2, 0.065, 0.05), (0.3, 0.065, 0.05), (0.5, 0.04, 0.035), (0.7, 0.045, 0.035), (1.0, 0.045, 0.035)]
-        {
+        for (roughness, of_lights, of_floors) in [(0.2, 0.065, 0.05), (0.5, 0.04, 0.035), (1.0, 0.045, 0.035)] {
             let scene = ball(&format!("roughness = {roughness:.1}, metallic = 1"), around);
             let found = error(&gpu.picture(&scene, options(), f32::INFINITY), &by_rays(&scene, 256, 0).linear);
             lines.push(format!("{name} {roughness}: {found:.4}"));

@@ -46,12 +46,12 @@ fn pictures_are_the_same_to_the_bit() {
     let Some(gpu) = gpu() else { return };
     let scene = room();
     for antialias in [Antialias::None, Antialias::Outlines, Antialias::Samples] {
-        let options = frame::Options { size: [192, 128], antialias, ..small() };
+        let options = frame::Options { size: [96, 64], antialias, ..small() };
         let without = frame::Options { skip: Skip::without("hidden"), ..options };
         let mut frames = [gpu.frame(&scene, options), gpu.frame(&scene, without)];
         let mut placements = scene.at(0.0);
         let mut rng = fastrand::Rng::with_seed(5);
-        for round in 0..12 {
+        for round in 0..8 {
             // At times all things move, mostly one or two, and now and then none.
             let movers: Vec<usize> = match round % 8 {
                 0 => (1..placements.len()).collect(),

@@ -40,6 +40,8 @@ pub(super) const ON_TRIANGLE: [[f32; 3]; 10] = [
     [0.02, 0.33, 0.65],
     [0.34, 0.33, 0.33],
 ];
+/// Of the vertices that may be added one in so many stands near lamps.
+const LAMPS_SHARE: usize = 8;
 /// Where triangles around a vertex are held to be on one side, on the way to their middles.
 const PARTED: f32 = 0.1;
 /// Share of the vertices by which a round may grow a group, so that the worst edges are split first.
@@ -248,6 +250,21 @@ impl Refined {
         half_lit.iter().map(|triangle| self.shared(longest(triangle))).collect()
     }
 
+    /// Edges that are longer than they are far from the middle of a lamp, and than it is wide from there, by their places.
+    fn beside_lamps(&self, space: &GroupSpace<'_>, lamps: &[(Vec3, f32)], least: f32) -> HashSet<Edge> {
+        let placed: Vec<Vec3> = self.positions.iter().map(|position| space.placed(*position).into()).collect();
+        let is_long = |&(a, b): &Edge| {
+            let [from, to] = [a, b].map(|v| placed[v as usize]);
+            let length = from.distance(to);
+            length > least
+                && lamps.iter().any(|(lamp, radius)| {
+                    let along = (*lamp - from).dot(to - from) / (length * length);
+                    length > radius.max(lamp.distance(from.lerp(to, along.clamp(0.0, 1.0))))
+                })
+        };
+        self.edges().into_iter().filter(is_long).map(|edge| self.shared(edge)).collect()
+    }
+
     /// Splits edges, given by their places, and those longest edges of triangles that have to be split before them.
     fn split(&mut self, mut marked: HashSet<Edge>) {
         loop {
@@ -351,6 +368,22 @@ fn follow_suns(surfaces: &mut [(Refined, GroupSpace<'_>, bool)], suns: &[DVec3],
     }
 }
 
+/// Splits edges beside lamps, along which light falls off by the square of the distance: the cord of a lamp would be lit
+/// from end to end by the bulb at its lower one.
+fn approach_lamps(surfaces: &mut [(Refined, GroupSpace<'_>, bool)], least: f32, budget: usize) {
+    loop {
+        let mut all_short = true;
+        for (refined, space, _) in surfaces.iter_mut() {
+            let marked = refined.beside_lamps(space, &space.lamps(), least);
+            all_short &= marked.is_empty();
+            refined.split(marked);
+        }
+        if all_short || vertex_count(surfaces) >= budget {
+            break;
+        }
+    }
+}
+
 /// Refines the surfaces of a group together; each comes with the space that its points are seen in. `told` hears how
 /// many vertices there are.
 pub(super) fn refine(
@@ -370,13 +403,14 @@ pub(super) fn refine(
         let budget = refined.positions.len() + share;
         refined.cut_longest(most / space.scale(), budget);
     }
+    approach_lamps(surfaces, limits.least_edge, vertex_count(surfaces) + (limits.vertices - start) / LAMPS_SHARE);
     let cut = vertex_count(surfaces);
     if !suns.is_empty() {
         let budget = cut + (limits.vertices - start) / SUNS_SHARE;
         follow_suns(surfaces, suns, limits, budget);
     }
     log::debug!(
-        "{start} vertices, {cut} with long edges cut, {} along edges of shadows, at most {}",
+        "{start} vertices, {cut} with edges cut that are long or beside lamps, {} along edges of shadows, at most {}",
         vertex_count(surfaces),
         limits.vertices
     );

@@ -31,7 +31,7 @@ use std::sync::{Arc, OnceLock};
 use std::time::Instant;
 
 /// Counts in every name of the cache: another number where a bake of surfaces computes something else.
-const VERSION: u32 = 61;
+const VERSION: u32 = 62;
 /// How far towards the middle of its triangles a vertex is seen from, as a share of the way: the light of a crease is
 /// that just inside each face. Where meshes are left as they are, so are the places from which they are seen.
 const NUDGE: f32 = 0.02;
@@ -744,8 +744,15 @@ impl GroupSpace<'_> {
         others.iter().any(|v| self.first_between(counts, place(first), place(v)).is_some())
     }
 
+    /// The bounding spheres of the group's other members that shine, in its frame.
+    pub fn lamps(&self) -> Vec<(Vec3, f32)> {
+        let members = self.group.plan.members.iter().zip(&self.group.spheres).enumerate();
+        let lamps = members.filter(|(index, (member, _))| *index != self.member && member.emits);
+        lamps.map(|(_, (_, (centre, radius)))| (centre.as_vec3(), *radius as f32)).collect()
+    }
+
     /// A point of the member's frame in the group's.
-    fn placed(&self, point: Vec3) -> Vec3A {
+    pub fn placed(&self, point: Vec3) -> Vec3A {
         self.group.place(self.own().placement.point(point.as_dvec3()))
     }
 

@@ -1,9 +1,10 @@
-//! Refines surfaces where their own visibility varies, under a budget of vertices.
+//! Refines surfaces where their own visibility varies, and beside lamps, under a budget of vertices.
 //!
 //! An edge is split where the transfer vector at its middle differs from the mean of its ends'. Edges come in the order
 //! of that difference times the area of their triangles, which is what the difference adds to a picture: by squared
-//! lengths the bars of window frames take all that a wall behind a blackboard needs. A triangle is bisected at its longest edge first, so that angles stay bounded (Rivara, *Mesh Refinement Processes Based on the
-//! Generalized Bisection of Simplices*, 1984). Both sides of an edge are split together: there are no T-junctions.
+//! lengths the bars of window frames take all that a wall behind a blackboard needs. A triangle is bisected at its
+//! longest edge first, so that angles stay bounded (Rivara, *Mesh Refinement Processes Based on the Generalized
+//! Bisection of Simplices*, 1984). Both sides of an edge are split together: there are no T-junctions.
 
 use super::own_visibility::Rays;
 use super::surfaces::{GroupSpace, triangles_around};

@@ -2,7 +2,7 @@
 
 use super::Checked;
 use super::instance::{Instance, OwnInstance};
-use super::pipeline::Kept;
+use super::pipeline::CachedPipeline;
 use super::select::{Candidate, choose, physical_devices, queue_family};
 use super::shader::{sealed, unsealed};
 use super::validation::Validation;
@@ -55,7 +55,7 @@ pub struct Device {
     pub(super) names: Option<ash::ext::debug_utils::Device>,
     pub(super) pipeline_cache: vk::PipelineCache,
     /// By the hash of all that they are made of.
-    pub(super) pipelines: Mutex<HashMap<[u8; 32], Arc<Kept>>>,
+    pub(super) pipelines: Mutex<HashMap<[u8; 32], Arc<CachedPipeline>>>,
     pipeline_key: String,
     pub limits: vk::PhysicalDeviceLimits,
     pub info: Candidate,
@@ -246,7 +246,7 @@ impl Drop for Device {
                 let _ = self.handle.device_wait_idle();
             }
             let pipelines = std::mem::take(self.pipelines.get_mut().unwrap_or_else(PoisonError::into_inner));
-            pipelines.values().for_each(|kept| kept.destroy(self));
+            pipelines.values().for_each(|pipeline| pipeline.destroy(self));
             self.handle.destroy_pipeline_cache(self.pipeline_cache, None);
             if !self.is_shared {
                 self.handle.destroy_device(None);

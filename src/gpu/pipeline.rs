@@ -76,13 +76,13 @@ impl Layout {
     }
 }
 
-/// A pipeline that a device keeps.
-pub(super) struct Kept {
+/// A pipeline that a device keeps, with its layout.
+pub(super) struct CachedPipeline {
     handle: vk::Pipeline,
     layout: Layout,
 }
 
-impl Kept {
+impl CachedPipeline {
     /// The pipeline of these shaders that `device` keeps, or the one that `make` makes of them.
     fn of(
         device: &Device,
@@ -98,8 +98,8 @@ impl Kept {
             hasher.update(bytemuck::cast_slice(&shader.spirv));
         });
         let key = *hasher.finalize().as_bytes();
-        let kept = || device.pipelines.lock().unwrap_or_else(PoisonError::into_inner);
-        if let Some(found) = kept().get(&key) {
+        let pipelines = || device.pipelines.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(found) = pipelines().get(&key) {
             return Ok(found.clone());
         }
         let layout = Layout::new(device, name, shaders)?;
@@ -108,11 +108,11 @@ impl Kept {
         let ms = start.elapsed().as_secs_f64() * 1e3;
         log::log!(if ms < LEAST_TOLD_MS { Level::Trace } else { Level::Debug }, "pipeline {name}: {ms:.0} ms");
         device.name(handle, name);
-        match kept().entry(key) {
-            Entry::Vacant(place) => Ok(place.insert(Arc::new(Kept { handle, layout })).clone()),
+        match pipelines().entry(key) {
+            Entry::Vacant(place) => Ok(place.insert(Arc::new(CachedPipeline { handle, layout })).clone()),
             // Another thread was quicker.
             Entry::Occupied(place) => {
-                Kept { handle, layout }.destroy(device);
+                CachedPipeline { handle, layout }.destroy(device);
                 Ok(place.get().clone())
             }
         }
@@ -177,8 +177,8 @@ const LEAST_TOLD_MS: f64 = 5.0;
 
 /// One compute shader, ready to dispatch.
 pub struct ComputePipeline {
-    kept: Arc<Kept>,
-    /// Keeps it.
+    cached: Arc<CachedPipeline>,
+    /// Destroys it.
     _device: Arc<Device>,
     pub local_size: [u32; 3],
     pub name: String,
@@ -191,23 +191,23 @@ impl ComputePipeline {
             .stage(vk::ShaderStageFlags::COMPUTE)
             .module(module.1)
             .name(c"main");
-        let kept = Kept::of(device, name, &[shader], "", |layout| {
+        let cached = CachedPipeline::of(device, name, &[shader], "", |layout| {
             let create = vk::ComputePipelineCreateInfo::default().stage(stage).layout(layout.pipeline);
-            // SAFETY: everything that `create` points to outlives the call; destroyed by `Kept`.
+            // SAFETY: everything that `create` points to outlives the call; destroyed by `CachedPipeline`.
             unsafe { device.handle.create_compute_pipelines(device.pipeline_cache, &[create], None) }
                 .map_err(|(_, code)| code)
                 .checked("vkCreateComputePipelines", name)
         })?;
         let local_size = shader.reflection.local_size;
-        Ok(ComputePipeline { kept, _device: device.clone(), local_size, name: name.into() })
+        Ok(ComputePipeline { cached, _device: device.clone(), local_size, name: name.into() })
     }
 
     pub(super) fn raw(&self) -> vk::Pipeline {
-        self.kept.handle
+        self.cached.handle
     }
 
     pub(super) fn layout(&self) -> &Layout {
-        &self.kept.layout
+        &self.cached.layout
     }
 }
 
@@ -245,8 +245,8 @@ impl GraphicsState {
 /// A vertex and a fragment shader, ready to draw indexed triangles. Vertex input `location` reads tightly packed floats
 /// from the vertex buffer bound at the same number.
 pub struct GraphicsPipeline {
-    kept: Arc<Kept>,
-    /// Keeps it.
+    cached: Arc<CachedPipeline>,
+    /// Destroys it.
     _device: Arc<Device>,
     pub(super) inputs: Vec<VertexInput>,
     pub name: String,
@@ -305,22 +305,22 @@ impl GraphicsPipeline {
             .color_blend_state(&blend)
             .dynamic_state(&dynamic)
             .push_next(&mut rendering);
-        let kept = Kept::of(device, name, &[vertex, fragment], &format!("{state:?}"), |layout| {
+        let cached = CachedPipeline::of(device, name, &[vertex, fragment], &format!("{state:?}"), |layout| {
             let create = create.layout(layout.pipeline);
-            // SAFETY: everything that `create` points to outlives the call; destroyed by `Kept`.
+            // SAFETY: everything that `create` points to outlives the call; destroyed by `CachedPipeline`.
             unsafe { device.handle.create_graphics_pipelines(device.pipeline_cache, &[create], None) }
                 .map_err(|(_, code)| code)
                 .checked("vkCreateGraphicsPipelines", name)
         })?;
-        Ok(GraphicsPipeline { kept, _device: device.clone(), inputs, name: name.into() })
+        Ok(GraphicsPipeline { cached, _device: device.clone(), inputs, name: name.into() })
     }
 
     pub(super) fn raw(&self) -> vk::Pipeline {
-        self.kept.handle
+        self.cached.handle
     }
 
     pub(super) fn layout(&self) -> &Layout {
-        &self.kept.layout
+        &self.cached.layout
     }
 }
 

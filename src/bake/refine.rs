@@ -252,7 +252,11 @@ impl Refined {
     }
 
     /// Edges that are longer than they are far from the middle of a lamp, and than it is wide from there, by their places.
-    fn beside_lamps(&self, space: &GroupSpace<'_>, lamps: &[(Vec3, f32)], least: f32) -> HashSet<Edge> {
+    fn beside_lamps(&self, space: &GroupSpace<'_>, least: f32) -> HashSet<Edge> {
+        let lamps = space.lamps();
+        if lamps.is_empty() {
+            return HashSet::new();
+        }
         let placed: Vec<Vec3> = self.positions.iter().map(|position| space.placed(*position).into()).collect();
         let is_long = |&(a, b): &Edge| {
             let [from, to] = [a, b].map(|v| placed[v as usize]);
@@ -351,35 +355,20 @@ fn vertex_count(surfaces: &[(Refined, GroupSpace<'_>, bool)]) -> usize {
     surfaces.iter().map(|(refined, ..)| refined.positions.len()).sum()
 }
 
-/// Splits triangles on which a sun shines in parts. The light that bounces off a surface is that of its vertices: through
-/// a window between two of them no sun would come in, and through one with a vertex it would shine on all that is nearest
-/// to that.
-fn follow_suns(surfaces: &mut [(Refined, GroupSpace<'_>, bool)], suns: &[DVec3], limits: &Limits, budget: usize) {
-    let mut even = vec![HashSet::new(); surfaces.len()];
+/// Splits the edges that `mark` finds of each surface, by its index, until there are none or the budget is spent.
+fn split_marked(
+    surfaces: &mut [(Refined, GroupSpace<'_>, bool)],
+    budget: usize,
+    mut mark: impl FnMut(usize, &Refined, &GroupSpace<'_>) -> HashSet<Edge>,
+) {
     loop {
-        let mut all_even = true;
-        for ((refined, space, _), even) in surfaces.iter_mut().zip(&mut even) {
-            let marked = refined.half_lit(space, suns, limits.sun_edge / space.scale(), even);
-            all_even &= marked.is_empty();
+        let mut is_done = true;
+        for (index, (refined, space, _)) in surfaces.iter_mut().enumerate() {
+            let marked = mark(index, refined, space);
+            is_done &= marked.is_empty();
             refined.split(marked);
         }
-        if all_even || vertex_count(surfaces) >= budget {
-            break;
-        }
-    }
-}
-
-/// Splits edges beside lamps, along which light falls off by the square of the distance: the cord of a lamp would be lit
-/// from end to end by the bulb at its lower one.
-fn approach_lamps(surfaces: &mut [(Refined, GroupSpace<'_>, bool)], least: f32, budget: usize) {
-    loop {
-        let mut all_short = true;
-        for (refined, space, _) in surfaces.iter_mut() {
-            let marked = refined.beside_lamps(space, &space.lamps(), least);
-            all_short &= marked.is_empty();
-            refined.split(marked);
-        }
-        if all_short || vertex_count(surfaces) >= budget {
+        if is_done || vertex_count(surfaces) >= budget {
             break;
         }
     }
@@ -404,11 +393,19 @@ pub(super) fn refine(
         let budget = refined.positions.len() + share;
         refined.cut_longest(most / space.scale(), budget);
     }
-    approach_lamps(surfaces, limits.least_edge, vertex_count(surfaces) + (limits.vertices - start) / LAMPS_SHARE);
+    // Light falls off by the square of the distance along edges beside lamps: the cord of one would be lit from end to end
+    // by the bulb at its lower one.
+    let budget = vertex_count(surfaces) + (limits.vertices - start) / LAMPS_SHARE;
+    split_marked(surfaces, budget, |_, refined, space| refined.beside_lamps(space, limits.least_edge));
     let cut = vertex_count(surfaces);
     if !suns.is_empty() {
         let budget = cut + (limits.vertices - start) / SUNS_SHARE;
-        follow_suns(surfaces, suns, limits, budget);
+        // The light that bounces off a surface is that of its vertices: through a window between two of them no sun would
+        // come in, and through one with a vertex it would shine on all that is nearest to that.
+        let mut even = vec![HashSet::new(); surfaces.len()];
+        split_marked(surfaces, budget, |index, refined, space| {
+            refined.half_lit(space, suns, limits.sun_edge / space.scale(), &mut even[index])
+        });
     }
     log::debug!(
         "{start} vertices, {cut} with edges cut that are long or beside lamps, {} along edges of shadows, at most {}",

@@ -186,12 +186,12 @@ pub struct ComputePipeline {
 
 impl ComputePipeline {
     pub fn new(device: &Arc<Device>, name: &str, shader: &Shader) -> Result<Self> {
-        let module = Module::new(device, shader)?;
-        let stage = vk::PipelineShaderStageCreateInfo::default()
-            .stage(vk::ShaderStageFlags::COMPUTE)
-            .module(module.1)
-            .name(c"main");
         let cached = CachedPipeline::of(device, name, &[shader], "", |layout| {
+            let module = Module::new(device, shader)?;
+            let stage = vk::PipelineShaderStageCreateInfo::default()
+                .stage(vk::ShaderStageFlags::COMPUTE)
+                .module(module.1)
+                .name(c"main");
             let create = vk::ComputePipelineCreateInfo::default().stage(stage).layout(layout.pipeline);
             // SAFETY: everything that `create` points to outlives the call; destroyed by `CachedPipeline`.
             unsafe { device.handle.create_compute_pipelines(device.pipeline_cache, &[create], None) }
@@ -260,53 +260,53 @@ impl GraphicsPipeline {
         fragment: &Shader,
         state: GraphicsState,
     ) -> Result<Self> {
-        let modules = [Module::new(device, vertex)?, Module::new(device, fragment)?];
-        let stages = [(vk::ShaderStageFlags::VERTEX, modules[0].1), (vk::ShaderStageFlags::FRAGMENT, modules[1].1)]
-            .map(|(stage, module)| {
-                vk::PipelineShaderStageCreateInfo::default().stage(stage).module(module).name(c"main")
-            });
         let inputs = vertex.reflection.inputs.clone();
-        let (bindings, attributes) = vertex_layout(&inputs);
-        let vertex_input = vk::PipelineVertexInputStateCreateInfo::default()
-            .vertex_binding_descriptions(&bindings)
-            .vertex_attribute_descriptions(&attributes);
-        let assembly =
-            vk::PipelineInputAssemblyStateCreateInfo::default().topology(vk::PrimitiveTopology::TRIANGLE_LIST);
-        let viewport = vk::PipelineViewportStateCreateInfo::default().viewport_count(1).scissor_count(1);
-        let raster = vk::PipelineRasterizationStateCreateInfo::default()
-            .polygon_mode(vk::PolygonMode::FILL)
-            .front_face(vk::FrontFace::COUNTER_CLOCKWISE)
-            .line_width(1.0);
-        let multisample = vk::PipelineMultisampleStateCreateInfo::default()
-            .rasterization_samples(vk::SampleCountFlags::from_raw(state.samples));
-        let depth = vk::PipelineDepthStencilStateCreateInfo::default()
-            .depth_test_enable(state.depth.is_some())
-            .depth_write_enable(state.depth.is_some() && state.keeps != Keeps::ColorOver)
-            .depth_compare_op(match state.keeps {
-                Keeps::ColorOver => vk::CompareOp::GREATER_OR_EQUAL,
-                _ => vk::CompareOp::GREATER,
-            });
-        let colors: Vec<vk::Format> = [state.color].into_iter().chain(state.second).collect();
-        let blend_attachments = vec![color_blend(state.keeps); colors.len()];
-        let blend = vk::PipelineColorBlendStateCreateInfo::default().attachments(&blend_attachments);
-        let dynamic_states = [vk::DynamicState::VIEWPORT, vk::DynamicState::SCISSOR, vk::DynamicState::CULL_MODE];
-        let dynamic = vk::PipelineDynamicStateCreateInfo::default().dynamic_states(&dynamic_states);
-        let mut rendering = vk::PipelineRenderingCreateInfo::default()
-            .color_attachment_formats(&colors)
-            .depth_attachment_format(state.depth.unwrap_or(vk::Format::UNDEFINED));
-        let create = vk::GraphicsPipelineCreateInfo::default()
-            .stages(&stages)
-            .vertex_input_state(&vertex_input)
-            .input_assembly_state(&assembly)
-            .viewport_state(&viewport)
-            .rasterization_state(&raster)
-            .multisample_state(&multisample)
-            .depth_stencil_state(&depth)
-            .color_blend_state(&blend)
-            .dynamic_state(&dynamic)
-            .push_next(&mut rendering);
         let cached = CachedPipeline::of(device, name, &[vertex, fragment], &format!("{state:?}"), |layout| {
-            let create = create.layout(layout.pipeline);
+            let modules = [Module::new(device, vertex)?, Module::new(device, fragment)?];
+            let stages = [(vk::ShaderStageFlags::VERTEX, modules[0].1), (vk::ShaderStageFlags::FRAGMENT, modules[1].1)]
+                .map(|(stage, module)| {
+                    vk::PipelineShaderStageCreateInfo::default().stage(stage).module(module).name(c"main")
+                });
+            let (bindings, attributes) = vertex_layout(&inputs);
+            let vertex_input = vk::PipelineVertexInputStateCreateInfo::default()
+                .vertex_binding_descriptions(&bindings)
+                .vertex_attribute_descriptions(&attributes);
+            let assembly =
+                vk::PipelineInputAssemblyStateCreateInfo::default().topology(vk::PrimitiveTopology::TRIANGLE_LIST);
+            let viewport = vk::PipelineViewportStateCreateInfo::default().viewport_count(1).scissor_count(1);
+            let raster = vk::PipelineRasterizationStateCreateInfo::default()
+                .polygon_mode(vk::PolygonMode::FILL)
+                .front_face(vk::FrontFace::COUNTER_CLOCKWISE)
+                .line_width(1.0);
+            let multisample = vk::PipelineMultisampleStateCreateInfo::default()
+                .rasterization_samples(vk::SampleCountFlags::from_raw(state.samples));
+            let depth = vk::PipelineDepthStencilStateCreateInfo::default()
+                .depth_test_enable(state.depth.is_some())
+                .depth_write_enable(state.depth.is_some() && state.keeps != Keeps::ColorOver)
+                .depth_compare_op(match state.keeps {
+                    Keeps::ColorOver => vk::CompareOp::GREATER_OR_EQUAL,
+                    _ => vk::CompareOp::GREATER,
+                });
+            let colors: Vec<vk::Format> = [state.color].into_iter().chain(state.second).collect();
+            let blend_attachments = vec![color_blend(state.keeps); colors.len()];
+            let blend = vk::PipelineColorBlendStateCreateInfo::default().attachments(&blend_attachments);
+            let dynamic_states = [vk::DynamicState::VIEWPORT, vk::DynamicState::SCISSOR, vk::DynamicState::CULL_MODE];
+            let dynamic = vk::PipelineDynamicStateCreateInfo::default().dynamic_states(&dynamic_states);
+            let mut rendering = vk::PipelineRenderingCreateInfo::default()
+                .color_attachment_formats(&colors)
+                .depth_attachment_format(state.depth.unwrap_or(vk::Format::UNDEFINED));
+            let create = vk::GraphicsPipelineCreateInfo::default()
+                .stages(&stages)
+                .vertex_input_state(&vertex_input)
+                .input_assembly_state(&assembly)
+                .viewport_state(&viewport)
+                .rasterization_state(&raster)
+                .multisample_state(&multisample)
+                .depth_stencil_state(&depth)
+                .color_blend_state(&blend)
+                .dynamic_state(&dynamic)
+                .layout(layout.pipeline)
+                .push_next(&mut rendering);
             // SAFETY: everything that `create` points to outlives the call; destroyed by `CachedPipeline`.
             unsafe { device.handle.create_graphics_pipelines(device.pipeline_cache, &[create], None) }
                 .map_err(|(_, code)| code)

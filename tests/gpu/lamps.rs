@@ -18,6 +18,9 @@ use shadow_fields::truth::raycast::RayCast;
 use shadow_fields::truth::world::World;
 use std::f32::consts::TAU;
 
+/// Pixels of pictures beside rays.
+const SIZE: [u32; 2] = [96, 64];
+
 fn turned(axis: Vec3, angle_deg: f64) -> RotationData {
     RotationData::AxisAngle { axis, angle_deg }
 }
@@ -32,16 +35,19 @@ fn picture_error(gpu: &Gpu, scene: &Scene) -> f64 {
     error_with(gpu, scene, Bounces::None)
 }
 
-fn error_with(gpu: &Gpu, scene: &Scene, bounces: Bounces) -> f64 {
-    let size = [96, 64];
+/// Pictures of a scene that is refined.
+fn options(bounces: Bounces) -> frame::Options {
     let bake = bake::Options { groups: true, vertices: 12_000, ..bake::Options::default() };
-    let options = frame::Options { size, bake, bounces, ..frame::Options::default() };
-    let found = gpu.picture(scene, options, f32::INFINITY);
+    frame::Options { size: SIZE, bake, bounces, ..frame::Options::default() }
+}
+
+fn error_with(gpu: &Gpu, scene: &Scene, bounces: Bounces) -> f64 {
+    let found = gpu.picture(scene, options(bounces), f32::INFINITY);
     let placements = scene.at(0.0);
     let world = World::of(scene, &placements);
     let bounces = u32::from(bounces != Bounces::None);
     let cast = RayCast { rays: 512, runs: 2, bounces, ..RayCast::default() };
-    let rays = pixels::picture(&world, size, true, &cast, &|_| ());
+    let rays = pixels::picture(&world, SIZE, true, &cast, &|_| ());
     // The lamp itself is brighter than all that it lights.
     let pairs = found.into_iter().zip(rays.linear);
     relative_rms(pairs.filter(|(found, truth)| found.max(*truth) < 0.6))
@@ -92,11 +98,8 @@ fn a_cord_is_not_lit_from_its_end() {
         .camera(Camera::new([0.1, 1.35, 1.3], [0.0, 1.25, 0.0]))
         .mesh("cord", generate::cuboid(Vec3::new(0.03, 1.2, 0.03), 1))
         .entity(stands("cord", [0.0, 1.23, 0.0]));
-    let size = [96, 64];
-    let bake = bake::Options { groups: true, vertices: 12_000, ..bake::Options::default() };
-    let options = frame::Options { size, bake, bounces: Bounces::None, ..frame::Options::default() };
-    let found = gpu.picture(&scene.build().unwrap(), options, f32::INFINITY);
-    let (above, below) = found.split_at(3 * (52 * size[0]) as usize);
+    let found = gpu.picture(&scene.build().unwrap(), options(Bounces::None), f32::INFINITY);
+    let (above, below) = found.split_at(3 * (52 * SIZE[0]) as usize);
     let brightest = |pixels: &[f32]| pixels.iter().copied().fold(0.0, f32::max);
     assert!(brightest(above) < 0.01 * brightest(below), "{} of {}", brightest(above), brightest(below));
 }

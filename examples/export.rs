@@ -21,11 +21,11 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let options = RenderOptions { bake: Quality::Draft.into(), lights: Lights::Sh, ..Default::default() };
     let mut renderer = Renderer::new(&gpu, &scene, &options)?;
     let mut model = Model::default();
-    let white = scene.data.output.white();
+    let white = renderer.scene().data.output.white();
     let light = renderer.light()?.to_vec();
     for (index, (placement, radiosity)) in scene.at(scene.data.output.time_s).iter().zip(light).enumerate() {
         let entity = &scene.entities[index];
-        let mesh = &scene.meshes[entity.mesh];
+        let mesh = renderer.mesh(index);
         if !entity.receives {
             continue;
         }

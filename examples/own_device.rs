@@ -69,7 +69,7 @@ unsafe fn light(
         .mesh("floor", Generator::Plane { size_m: 4.0, cells: 32 })
         .mesh("ball", ball)
         .entity(EntityData::of_mesh("floor"))
-        .entity(EntityData { position: [0.0, 0.6, 0.0].into(), ..EntityData::of_mesh("ball") })
+        .entity(EntityData { position: [0.0, 0.6, 0.0].into(), movable: true, ..EntityData::of_mesh("ball") })
         .entity(EntityData { position: [1.0, 2.2, 0.5].into(), scale: 0.3, ..lamp })
         .build()?;
     let mut renderer =

@@ -85,8 +85,8 @@
 //! | [`draw`] | camera, rasterisation, smoothed outlines, tone and encoding |
 //! | [`scene_buffers`] | what a scene keeps on the device, and whether it fits |
 //! | [`frame`] | the sequence of passes with all barriers |
-//! | [`renderer`] | the front door for programs: a device, a scene, its light and its picture |
 //! | [`truth`] | ray casting and the exact SH chain |
+//! | [`renderer`] | the front door for programs: a device, a scene, its light and its picture |
 //! | [`check`] | every pass against its CPU twin |
 //! | `bench` | measurements of time and error (feature `cli`) |
 //! | [`farm`] | bakes and pictures of many machines: plans, results, engines (`docs/farm.md` says how they are used) |

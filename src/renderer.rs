@@ -18,21 +18,23 @@
 //! [`Renderer::light_buffer`] gives the light to it where it lies. The files in `examples/` show each of these.
 
 use crate::asset::decode::Picture;
-use crate::asset::picture;
+use crate::asset::{Mesh, picture};
 use crate::bake::Baker;
 use crate::bake::cache::Cache;
 use crate::bake::ensure::SceneProgress;
 use crate::error::{Error, Result};
 use crate::field::quantity::channel_stride;
-use crate::frame::Frame;
 pub use crate::frame::RenderOptions;
+use crate::frame::{self, Frame};
 use crate::gpu::Gpu;
 use crate::scene::{Camera, Placement, Scene};
 use crate::sh::lobe;
 use crate::shaders::Library;
+use crate::truth::exposure;
 use ash::vk;
 use std::ops::Range;
 use std::path::Path;
+use std::sync::Arc;
 
 /// Largest magnitude of a coordinate of a placement, metres, and largest scale; suns stand at a tenth of it.
 const FARTHEST_M: f32 = 1e10;
@@ -61,7 +63,7 @@ pub struct LightBuffer<'r> {
 pub struct LightRange<'r> {
     /// Bytes in the buffer, 16 a vertex. They stay black where the entity does not receive light.
     pub bytes: Range<u64>,
-    /// Which vertex of the entity's mesh stands at each place of that range: the light of neighbours lies together.
+    /// Which vertex of [`Renderer::mesh`] stands at each place of that range: the light of neighbours lies together.
     pub order: &'r [u32],
 }
 
@@ -79,6 +81,8 @@ pub struct Transfer {
 pub struct Renderer {
     gpu: Gpu,
     frame: Frame,
+    /// Where everything stands as the scene has it.
+    stood: Vec<Placement>,
     /// Where everything stands; `None` until the first update.
     placements: Option<Vec<Placement>>,
     /// Light by entity as the host has it; empty until it is asked for.
@@ -86,7 +90,8 @@ pub struct Renderer {
 }
 
 impl Renderer {
-    /// Bakes what the scene needs, or finds it in the cache, and builds the passes.
+    /// Bakes what the scene needs, or finds it in the cache, and builds the passes. A scene that states no exposure gets
+    /// the one that suits its light at its own time; a camera that was added to a file is placed for the picture's shape.
     ///
     /// # Errors
     /// As [`Frame::new`]; `Input` where an option is out of its range.
@@ -105,27 +110,29 @@ impl Renderer {
         options: &RenderOptions,
         progress: SceneProgress<'_>,
     ) -> Result<Self> {
-        let mut frame_options = options.frame(scene)?;
-        // A caller may place any entity anywhere, and reads light by the vertices of its own meshes.
-        frame_options.bake.groups = false;
-        frame_options.bake.vertices = 0;
-        frame_options.pictures = false;
+        let frame_options = frame::Options { pictures: false, ..options.frame(scene)? };
+        let mut scene = scene.clone();
+        let time_s = scene.data.output.time_s;
+        let aspect = f64::from(frame_options.size[0]) / f64::from(frame_options.size[1]);
+        scene.fit_added_camera(aspect);
+        exposure::settle(&mut scene, time_s, aspect);
         let folder = gpu.device().cache_dir.clone();
         let cache = options.cache.clone().unwrap_or_else(|| Cache::new(folder.as_deref()));
         let baker = Baker::new(gpu.device(), &Library { shader_dir: None, cache_dir: folder });
-        let frame = Frame::new(&baker, &cache, scene, frame_options, progress)?;
+        let frame = Frame::new(&baker, &cache, &scene, frame_options, progress)?;
         gpu.device().save_pipeline_cache();
-        Ok(Renderer { gpu: gpu.clone(), frame, placements: None, light: Vec::new() })
+        Ok(Renderer { gpu: gpu.clone(), frame, stood: scene.at(time_s), placements: None, light: Vec::new() })
     }
 
     /// Lights every receiver with all entities placed so, as far as anything has changed since the last call. The list
     /// is as that of [`Scene::at`], with other placements for those that move: entities in the scene's order, then
-    /// suns.
+    /// suns. What has motion of its own or is `movable` may stand anywhere; what rests is lit past all else that rests,
+    /// and stays where it is.
     ///
     /// # Errors
     /// `Input` where the list has another length than the scene has entities, or a placement has a number that is not
-    /// finite or over 1e10, a rotation that is not of unit length, or a scale that is not positive; `Device` when the
-    /// device was lost.
+    /// finite or over 1e10, a rotation that is not of unit length, or a scale that is not positive, or moves what rests
+    /// or what nodes carry against the others that they carry; `Device` when the device was lost.
     pub fn update(&mut self, placements: &[Placement]) -> Result<()> {
         let entities = &self.frame.scene().entities;
         if placements.len() != entities.len() {
@@ -143,13 +150,26 @@ impl Renderer {
                 return Err(Error::Input(format!("{:?}: {placement:?} is out of range: {ranges}", entity.name)));
             }
         }
+        if let Some(entity) = self.frame.groups.displaced(self.frame.scene(), &self.stood, placements) {
+            let why = "the scene has it stand elsewhere among what it never moves against: let it be `movable`";
+            return Err(Error::Input(format!("{:?}: {why}", entities[entity].name)));
+        }
         self.light.clear();
         self.frame.render(placements, None)?;
         self.placements = Some(placements.to_vec());
         Ok(())
     }
 
-    /// Radiosity of every vertex, by entity in the scene's order and by vertex in the mesh's order: linear RGB radiance
+    /// The mesh of an entity as it is lit and drawn: the scene's, or one of the same shape with more vertices where light
+    /// varies.
+    ///
+    /// # Panics
+    /// Where there is no such entity.
+    pub fn mesh(&self, entity: usize) -> &Arc<Mesh> {
+        self.frame.scene().surface(entity)
+    }
+
+    /// Radiosity of every vertex, by entity in the scene's order and by vertex of [`Renderer::mesh`]: linear RGB radiance
     /// that leaves the surface, without emission, in W m^-2 sr^-1; zero where an entity does not receive. Before the
     /// first update it is that of the scene's own time.
     ///

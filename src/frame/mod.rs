@@ -80,7 +80,7 @@ pub struct Frame {
     library: Library,
     scene: Scene,
     /// Which entities never move against each other.
-    groups: Groups,
+    pub(crate) groups: Groups,
     /// The suns of which vertices tell whether they are hidden, in the order of their bits.
     told_suns: Vec<ToldSun>,
     /// What occludes and rested when that was baked, and where.

@@ -438,6 +438,10 @@ pub struct EntityData {
     /// Movements, which are applied from first to last.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub motion: Vec<Motion>,
+    /// Whether a program may place it anywhere, so that nothing is baked of how it stands among others. The default is
+    /// `false`: it moves as `motion` has it.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub movable: bool,
 }
 
 fn is_opaque(opacity: &f32) -> bool {
@@ -467,6 +471,7 @@ impl EntityData {
             occludes: None,
             receives: None,
             motion: Vec::new(),
+            movable: false,
         }
     }
 

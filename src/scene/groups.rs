@@ -3,7 +3,8 @@
 
 use super::Scene;
 use super::light::Lights;
-use super::motion::Motion;
+use super::motion::{Motion, Placement};
+use glam::{Quat, Vec3};
 
 /// The group of every entity.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -79,6 +80,26 @@ impl Groups {
         self.of[a] == self.of[b]
     }
 
+    /// The first entity that has left its place in its group: what rests stands as in `stood`, and what is carried stands
+    /// so against the first member. Rounding is allowed for.
+    pub fn displaced(&self, scene: &Scene, stood: &[Placement], placements: &[Placement]) -> Option<usize> {
+        let world = Placement { position: Vec3::ZERO, rotation: Quat::IDENTITY, scale: 1.0 };
+        let is_displaced = |entity: usize| {
+            let first = self.of[entity] as usize;
+            let frames = if scene.is_at_rest(entity) { [&world; 2] } else { [&stood[first], &placements[first]] };
+            let [was, is] = [&stood[entity], &placements[entity]];
+            let expected = frames[1].point(frames[0].local(was.position.as_dvec3()));
+            let turn = frames[1].turn() * frames[0].turn().inverse() * was.turn();
+            let scale = was.scale / frames[0].scale * frames[1].scale;
+            let radius_m = scene.meshes[scene.entities[entity].mesh].bounding_sphere().1 * scale;
+            let rounding_m = 1e-6 * expected.length().max(frames[0].local(was.position.as_dvec3()).length());
+            expected.distance(is.position.as_dvec3()) > 1e-4 * f64::from(radius_m) + rounding_m
+                || turn.dot(is.turn()).abs() < 1.0 - 1e-6
+                || (is.scale / scale - 1.0).abs() > 1e-4
+        };
+        (0..scene.data.entities.len()).find(|&entity| is_displaced(entity))
+    }
+
     /// Whether an entity moves against others, which are flagged and of one group.
     pub fn moves_among(&self, entity: usize, others: &[bool]) -> bool {
         others.iter().position(|other| *other).is_some_and(|other| !self.are_one(entity, other))
@@ -133,6 +154,31 @@ mod tests {
         };
         let mut scene = scene(&[1.0, 2.0, 1.0, 1.0].map(carried).concat());
         assert_eq!(Groups::new(&scene, Lights::Sharp).members(), [vec![0, 2, 3], vec![1], vec![4, 6, 7], vec![5]]);
+        let groups = Groups::new(&scene, Lights::Sharp);
+        let stood = scene.at(0.0);
+        let displaced = |placements: &[Placement]| groups.displaced(&scene, &stood, placements);
+        let with = |change: &dyn Fn(usize, Placement) -> Placement| -> Vec<Placement> {
+            stood.iter().enumerate().map(|(entity, placement)| change(entity, *placement)).collect()
+        };
+        let turned = |placement: Placement| {
+            let turn = Placement { position: Vec3::Y, rotation: Quat::from_rotation_y(0.7), scale: 1.5 };
+            Placement {
+                position: turn.point(placement.position.as_dvec3()).as_vec3(),
+                rotation: turn.rotation * placement.rotation,
+                scale: turn.scale * placement.scale,
+            }
+        };
+        let raised = |placement: Placement| Placement { position: placement.position + 0.01 * Vec3::Y, ..placement };
+        let carried = |entity| [4, 6, 7].contains(&entity);
+        assert_eq!([displaced(&stood), displaced(&scene.at(0.37))], [None; 2]);
+        assert_eq!(displaced(&with(&|entity, at| if carried(entity) { turned(at) } else { at })), None);
+        assert_eq!(
+            displaced(&with(&|entity, at| if carried(entity) && entity != 7 { turned(at) } else { at })),
+            Some(7)
+        );
+        assert_eq!(displaced(&with(&|entity, at| if entity == 6 { raised(at) } else { at })), Some(6));
+        assert_eq!(displaced(&with(&|entity, at| if entity == 2 { raised(at) } else { at })), Some(2));
+        assert_eq!(displaced(&with(&|entity, at| if [1, 5].contains(&entity) { raised(at) } else { at })), None);
         scene.loosen(6);
         assert_eq!(Groups::new(&scene, Lights::Sharp).members()[2..], [vec![4, 7], vec![5], vec![6]]);
     }

@@ -350,11 +350,11 @@ impl Scene {
     }
 
     /// The nodes that carry an entity, none where it rests: entities with the same ones never move against each other.
-    /// `None` of one that has movements of its own or was taken out of its group.
+    /// `None` of one that has movements of its own, is movable or was taken out of its group.
     pub(crate) fn carriers(&self, entity: usize) -> Option<&[Motion]> {
-        let motion = &self.data.entities.get(entity)?.motion[..];
+        let EntityData { motion, movable, .. } = self.data.entities.get(entity)?;
         let is_carried = motion.iter().all(|motion| matches!(motion, Motion::Node(_)));
-        (is_carried && !self.loose.contains(&entity)).then_some(motion)
+        (is_carried && !movable && !self.loose.contains(&entity)).then_some(motion)
     }
 
     /// Puts all entities that were taken out back into their groups. Returns whether there were any.

@@ -4,8 +4,7 @@ use crate::common::{gpu, parse};
 use crate::stage::{shines, stands};
 use glam::{Quat, Vec3};
 use shadow_fields::asset::environment::EnvironmentData;
-use shadow_fields::bake;
-use shadow_fields::frame::{self, Frame};
+use shadow_fields::frame::Frame;
 use shadow_fields::gpu::Gpu;
 use shadow_fields::prelude::{Cache, Camera, EntityData, Error, Generator, Quality};
 use shadow_fields::prelude::{Placement, RenderOptions, Renderer, Scene};
@@ -20,7 +19,7 @@ fn room() -> SceneBuilder {
         .mesh("ring", Generator::Torus { major_m: 0.4, minor_m: 0.15, segments: 16, sides: 8 })
         .mesh("lamp", Generator::Sphere { radius_m: 0.1, subdivisions: 2 })
         .entity(EntityData::of_mesh("floor"))
-        .entity(stands("ring", [0.0, 0.6, 0.0]))
+        .entity(EntityData { movable: true, ..stands("ring", [0.0, 0.6, 0.0]) })
         .entity(shines("lamp", [0.0, 1.8, 0.0], 30.0))
 }
 
@@ -83,10 +82,10 @@ fn light_and_picture_are_those_of_a_frame() {
     let scene = room().build().unwrap();
     let options = RenderOptions { cache: Some(cache.clone()), ..small() };
     let mut renderer = Renderer::new(&door, &scene, &options).unwrap();
-    // A renderer's entities may be placed anywhere, so each is a group by itself.
-    let bake = bake::Options { groups: false, vertices: 0, ..Quality::Draft.options() };
-    let wanted = frame::Options { bake, size: [96, 64], ..Default::default() };
-    let mut frame = Frame::new(&gpu.baker(), &cache, &scene, wanted, &|_, _, _| ()).unwrap();
+    let scene = renderer.scene().clone();
+    assert!(scene.data.output.exposure_ev.is_some(), "it is found from the light");
+    let white = scene.data.output.white();
+    let mut frame = Frame::new(&gpu.baker(), &cache, &scene, options.frame(&scene).unwrap(), &|_, _, _| ()).unwrap();
     let black = renderer.light_buffer();
     assert_eq!(black.entities.len(), 3);
     assert_eq!(black.size_bytes, black.entities.last().unwrap().bytes.end);
@@ -95,11 +94,13 @@ fn light_and_picture_are_those_of_a_frame() {
         placements[1].position.x += 0.2 * step as f32;
         placements[1].rotation = Quat::from_rotation_x(0.4 * step as f32);
         renderer.update(&placements).unwrap();
-        frame.render(&placements, Some(1.0)).unwrap();
+        frame.render(&placements, Some(white)).unwrap();
         let expected = frame.picture();
         frame.render(&placements, None).unwrap();
         for entity in 0..3 {
-            assert!(renderer.light().unwrap()[entity] == frame.radiosity(entity).unwrap(), "entity {entity}");
+            let light = &renderer.light().unwrap()[entity];
+            assert!(*light == frame.radiosity(entity).unwrap(), "entity {entity}");
+            assert_eq!(light.len(), renderer.mesh(entity).positions.len());
         }
         let picture = renderer.picture().unwrap();
         assert!((picture.width, picture.height, picture.is_linear) == (96, 64, true));
@@ -140,6 +141,10 @@ fn a_renderer_lights_its_scene_at_once_and_refuses_what_is_no_placement() {
     ] {
         refuse(&mut renderer, &[good[0], bad, good[2]]);
     }
+    // The floor and the lamp rest: light past one another is baked.
+    let aside = |placement: Placement| Placement { position: placement.position + Vec3::X, ..placement };
+    refuse(&mut renderer, &[aside(good[0]), good[1], good[2]]);
+    refuse(&mut renderer, &[good[0], good[1], Placement { rotation: Quat::from_rotation_x(0.1), ..good[2] }]);
     assert!(renderer.light().unwrap() == at_once, "what is refused changes nothing");
 
     // Transfer vectors: baked ones of the ring, lobes of the floor; the first coefficient of an open vertex is sqrt(pi)

@@ -66,8 +66,9 @@ pub fn draw(
     // wgpu's clip space has y up.
     let flip = Mat4::from_scale(Vec3::new(1.0, -1.0, 1.0)).as_dmat4();
     let clip_from_world = flip * camera::clip_from_world(&scene.data.camera, f64::from(SIZE[0]) / f64::from(SIZE[1]));
-    for ((entity, placement), range) in scene.entities.iter().zip(placements).zip(&light.entities) {
-        let mesh = &scene.meshes[entity.mesh];
+    for (index, (placement, range)) in placements.iter().zip(&light.entities).enumerate() {
+        let entity = &scene.entities[index];
+        let mesh = renderer.mesh(index);
         let centre = mesh.bounding_sphere().0;
         let matrix = (clip_from_world * camera::world_from_centred(placement, centre.as_dvec3())).as_mat4();
         let block =

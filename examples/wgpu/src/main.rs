@@ -8,6 +8,7 @@ use shadow_fields::asset::picture::{encode_srgb, linear_from_srgb, write_png};
 use shadow_fields::draw::{Antialias, Shading};
 use shadow_fields::asset::environment::EnvironmentData;
 use shadow_fields::prelude::*;
+use shadow_fields::scene::Output;
 use wgpu::hal::api::Vulkan;
 
 /// Width and height of the picture in pixels.
@@ -71,6 +72,7 @@ fn scene() -> Result<Scene, Error> {
             emission: [60.0, 54.0, 44.0].into(),
             ..EntityData::of_mesh("lamp")
         })
+        .output(Output { exposure_ev: Some(0.0), ..Default::default() })
         .build()
 }
 

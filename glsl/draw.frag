@@ -3,6 +3,9 @@
 #extension GL_EXT_samplerless_texture_functions : require
 #include "finish.glsl"
 #include "centroid.glsl"
+#if PAINTED
+#include "textured.glsl"
+#endif
 layout(location = 0) centroid in vec4 radiance; // w: 1
 layout(location = 0) out vec4 color; // alpha: the entity's tag
 #if PAINTED || PIXEL
@@ -54,7 +57,7 @@ void main() {
     find_light(push.entity, edge > 0.0, lit, light_shares);
 #endif
 #if PAINTED
-    vec4 texel = texture(picture, uv);
+    vec4 texel = textured(picture, uv);
     cut_holes(texel.a, push.paint.w);
     vec3 over_mean = push.paint.rgb * texel.rgb;
 #if OVER

@@ -52,7 +52,7 @@ vec3 mapped_normal(vec3 n, vec3 place, vec2 uv, float slope) {
     vec3 against_v = (place_x * uv_y.x - place_y * uv_x.x) * sign(turn);
     along_u -= n * dot(n, along_u);
     against_v -= n * dot(n, against_v);
-    vec3 found = 2.0 * texture(normal_picture, uv).xyz - 1.0;
+    vec3 found = 2.0 * textured(normal_picture, uv).xyz - 1.0;
     vec3 tilted = slope * found.x * along_u / max(length(along_u), 1e-20)
                 + slope * found.y * against_v / max(length(against_v), 1e-20) + max(found.z, 0.0) * n;
     return turn != 0.0 && dot(tilted, tilted) > 0.0 ? normalize(tilted) : n;
@@ -96,7 +96,7 @@ vec3 glossy(uint index, vec3 base, vec3 light, vec4 share, vec2 uv, float within
     float roughness = entity.roughness, metallic = entity.metallic;
     Reflection found = Reflection(within * first.rgb, within * second);
 #if TEXTURED
-    vec4 of_gloss = texture(gloss_picture, uv);
+    vec4 of_gloss = textured(gloss_picture, uv);
     roughness = clamp(entity.factors.x * of_gloss.g, 0.0, 1.0);
     metallic = clamp(entity.factors.y * of_gloss.b, 0.0, 1.0);
     vec3 mapped = mapped_normal(n, from_eye, uv, entity.factors.z);
@@ -189,7 +189,7 @@ vec3 glossy(uint index, vec3 base, vec3 light, vec4 share, vec2 uv, float within
 vec3 glow(uint index, vec3 by_vertex, vec3 factor, vec2 uv) {
 #if TEXTURED
     GlossEntity entity = gloss_entity_at(index);
-    return mix(by_vertex, factor * entity.glow.rgb * texture(emission_picture, uv).rgb, entity.factors.w);
+    return mix(by_vertex, factor * entity.glow.rgb * textured(emission_picture, uv).rgb, entity.factors.w);
 #else
     return by_vertex;
 #endif

@@ -328,3 +328,39 @@ fn textures_are_even_under_four_samples() {
     }
     assert!(compared > 1000, "{compared} pixels");
 }
+
+/// Stripes that run away from the eye stay apart where a pixel covers many of their texels, but all along one.
+#[test]
+fn stripes_seen_along_them_stay_apart() {
+    let Some(gpu) = gpu() else { return };
+    let mesh = quad([[-2.0, -1.0, 2.0], [2.0, -1.0, 2.0], [2.0, -1.0, -8.0], [-2.0, -1.0, -8.0]], None);
+    let stripe_m = 0.25;
+    let rgba = (0..64 * 64).map(|i| if i % 64 / 4 % 2 == 0 { [0, 0, 0, 255] } else { [255; 4] }).collect();
+    let scene = Scene::builder()
+        .camera(Camera::new([0.0, -0.7, 5.0], [0.0, -0.7, 0.0]))
+        .environment(EnvironmentData { uniform: Some(Vec3::ONE), ..EnvironmentData::default() })
+        .texture("stripes", Texture { alpha_cutoff: None, ..holed(64, rgba) })
+        .mesh("floor", mesh)
+        .entity(EntityData { albedo: Albedo::Texture("stripes".into()), ..EntityData::of_mesh("floor") });
+    let scene = scene.build().unwrap();
+    for antialias in [Antialias::None, Antialias::Samples] {
+        let picture = gpu.picture(&scene, options(antialias), f32::INFINITY);
+        let (mut off, mut compared) = (0.0, 0);
+        for (i, pixel) in picture.chunks_exact(3).enumerate() {
+            let slope = 20.0_f32.to_radians().tan() / 32.0;
+            let down = slope * ((i / WIDTH) as f32 + 0.5 - 32.0);
+            let away = 0.3 / down;
+            let stripes = (2.0 + away * slope * ((i % WIDTH) as f32 + 0.5 - 48.0)) / stripe_m;
+            // A pixel of an edge has some of both.
+            let inside = stripes.fract().min(1.0 - stripes.fract()) * stripe_m / (away * slope);
+            if (3.5..8.0).contains(&away) && (0.5..15.5).contains(&stripes) && inside > 1.0 {
+                off += (pixel[0] - (stripes.floor() % 2.0)).abs();
+                compared += 1;
+            }
+        }
+        assert!(
+            compared > 60 && off / (compared as f32) < 0.1,
+            "{antialias:?}: {compared} pixels, off by {off} in all"
+        );
+    }
+}

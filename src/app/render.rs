@@ -346,13 +346,16 @@ impl<'a> Rendering<'a> {
             let prepared_ms = self.prepared.as_secs_f64() * 1e3;
             format!(", {} lit vertices, prepared in {prepared_ms:.0} ms", frame.receiver_vertex_count())
         });
+        let median = spread(&walls).median;
+        let frames = match arguments.frames {
+            1 => format!("the first frame in {median:.1} ms"),
+            count => format!("{count} frames, each in {median:.1} ms (median)"),
+        };
         format!(
-            "{}: {} entities{}, {} in {:.1} ms (median), {}",
+            "{}: {} entities{}, {frames}, {}",
             output::shown(&arguments.output),
             self.scene.entities.len(),
             prepared.unwrap_or_default(),
-            if arguments.frames == 1 { "a frame".into() } else { format!("{} frames, each", arguments.frames) },
-            spread(&walls).median,
             match &self.frame {
                 Some(frame) if !arguments.reference => format!("variant {}", frame.variant().name),
                 _ => format!(

@@ -229,6 +229,8 @@ pub struct Eye {
     pub origin: Vec3,
     /// Unit normal in the object's frame.
     pub normal: Vec3,
+    /// How near things are that lie upon the surface, in the blockers' frame.
+    pub near: f32,
 }
 
 /// How a receiver stands among its blockers.
@@ -255,7 +257,9 @@ pub struct Seen {
     pub blocked: f64,
     /// Share that is blocked by backs of triangles.
     pub behind: f64,
-    /// Whether the point lies inside a solid or below a sheet.
+    /// Share that is blocked by what is near ([`Eye::near`]).
+    pub near: f64,
+    /// Whether the point lies inside a solid, below a sheet, or close behind something.
     pub buried: bool,
     /// Fronts that the rays met, of [`Rays::Many`] alone.
     pub fronts: Vec<Front>,
@@ -441,6 +445,7 @@ pub fn see(blockers: &Blockers, standing: &Standing, eye: &Eye, bands: usize, ra
         sky: Vec::new(),
         blocked: 0.0,
         behind: 0.0,
+        near: 0.0,
         buried: false,
         fronts: Vec::new(),
     };
@@ -450,6 +455,7 @@ pub fn see(blockers: &Blockers, standing: &Standing, eye: &Eye, bands: usize, ra
         seen.taken[..count].iter_mut().zip(&ray.share[..count]).for_each(|(sum, share)| *sum += share);
         seen.blocked += ray.weight / PI;
         seen.behind += if found.from_behind { ray.weight / PI } else { 0.0 };
+        seen.near += if found.distance < eye.near { ray.weight / PI } else { 0.0 };
     };
     match rays {
         Rays::Few => FEW_RAYS.iter().zip(&caster.cast(&locals(&*FEW_RAYS))).for_each(|(ray, hit)| add(ray, hit)),
@@ -673,7 +679,7 @@ mod tests {
     fn under_a_ball(toward: DVec3, with_map: bool) -> Seen {
         let ball = generate::sphere(1.0, 5);
         let corners = ball.triangles.iter().map(|t| (7, t.map(|i| ball.positions[i as usize] + toward.as_vec3())));
-        let eye = Eye { origin: Vec3::ZERO, normal: Vec3::Y };
+        let eye = Eye { origin: Vec3::ZERO, normal: Vec3::Y, near: 0.0 };
         let counts =
             Counts { blocks: &[true; 8], in_map: with_map.then_some(&[7]), sky: false, targets: &[], screens: &[] };
         let standing = Standing { rotation: DMat3::IDENTITY, radius: 1.0 };
@@ -733,7 +739,11 @@ mod tests {
         let [mut mean, mut square] = [0.0; 2];
         const PLACES: usize = 400;
         for place in 0..PLACES {
-            let eye = Eye { origin: Vec3::new(0.00371 * place as f32, 0.0, 0.001 * place as f32), normal: Vec3::Y };
+            let eye = Eye {
+                origin: Vec3::new(0.00371 * place as f32, 0.0, 0.001 * place as f32),
+                normal: Vec3::Y,
+                near: 0.0,
+            };
             let directions: Vec<Vec3A> = lattice(40_000).filter(|d| d.y > 0.0).map(|d| d.as_vec3a()).collect();
             let mut hits = Vec::new();
             blockers.first(eye.origin.into(), &Mat3A::IDENTITY, &directions, &[true], &mut hits);
@@ -778,7 +788,7 @@ mod tests {
         };
         let near = square(1.0).map(|t| (0, t));
         let far = square(0.5).map(|t| (1, t));
-        let eye = Eye { origin: Vec3::ZERO, normal: Vec3::Y };
+        let eye = Eye { origin: Vec3::ZERO, normal: Vec3::Y, near: 0.0 };
         let standing = Standing { rotation: DMat3::IDENTITY, radius: 1.0 };
         let see_with = |in_map: &[u32], corners: &[(u32, [Vec3; 3])]| {
             let counts = Counts { blocks: &[true; 2], in_map: Some(in_map), sky: false, targets: &[], screens: &[] };

@@ -7,7 +7,7 @@
 //! Bisection of Simplices*, 1984). Both sides of an edge are split together: there are no T-junctions.
 
 use super::own_visibility::Rays;
-use super::surfaces::{GroupSpace, triangles_around};
+use super::surfaces::{GroupSpace, Place, triangles_around};
 use crate::asset::Mesh;
 use crate::asset::mesh::Attributes;
 use glam::{DVec3, Vec3};
@@ -179,7 +179,8 @@ impl Refined {
         let Refined { transfers, positions, normals, .. } = self;
         transfers.par_iter_mut().enumerate().for_each(|(v, transfer)| {
             transfer.get_or_insert_with(|| {
-                space.transfer(&space.see(positions[v], normals[v], nudges[v], Rays::Few), normals[v])
+                let place = Place { position: positions[v], normal: normals[v], nudge: nudges[v], edge: 0.0 };
+                space.transfer(&space.see(place, Rays::Few), normals[v])
             });
         });
         let mut edges: Vec<Edge> = self.edges().into_iter().collect();
@@ -191,7 +192,7 @@ impl Refined {
             let position = 0.5 * (self.positions[a_index] + self.positions[b_index]);
             let normal = (self.normals[a_index] + self.normals[b_index]).normalize_or(self.normals[a_index]);
             let nudge = 0.5 * (nudges[a_index] + nudges[b_index]);
-            let seen = space.see(position, normal, nudge, Rays::Few);
+            let seen = space.see(Place { position, normal, nudge, edge: 0.0 }, Rays::Few);
             let transfer = space.transfer(&seen, normal);
             let ends = transfer_of(a_index).iter().zip(transfer_of(b_index));
             let squares = transfer.iter().zip(ends).map(|(middle, (a, b))| (middle - 0.5 * (a + b)).powi(2));

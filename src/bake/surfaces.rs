@@ -31,7 +31,7 @@ use std::sync::{Arc, OnceLock};
 use std::time::Instant;
 
 /// Counts in every name of the cache: another number where a bake of surfaces computes something else.
-const VERSION: u32 = 62;
+const VERSION: u32 = 63;
 /// How far towards the middle of its triangles a vertex is seen from, as a share of the way: the light of a crease is
 /// that just inside each face. Where meshes are left as they are, so are the places from which they are seen.
 const NUDGE: f32 = 0.02;
@@ -71,6 +71,12 @@ const LIT_SHARE: f64 = 0.125;
 pub(super) const BURIED_BACKS: f64 = 0.5;
 /// Share of it that is blocked there at least.
 pub(super) const BURIED_BLOCKED: f64 = 0.35;
+/// Share of it that is blocked by what is nearer than a share of the edges around, as behind a picture on a wall: it is
+/// dark there, and nowhere else on the triangles.
+const BURIED_NEAR: f64 = 0.7;
+const NEAR: f32 = 0.4;
+/// Share that is blocked so at a place that is taken first in its stead.
+const OPEN_NEAR: f64 = 0.1;
 /// Vertices are of one side if their normals have such a cosine with the mean, and if they lie apart along it by no more
 /// than such a share of their extent.
 const LEAST_COMMON: f32 = 0.5;
@@ -85,6 +91,17 @@ const RISES: f32 = 1e-3;
 const WAYS_OUT: [f32; 5] = [0.06, 0.15, 0.3, 0.5, 0.8];
 /// The same on the way to the vertices beside it, where the middles of all its triangles are buried too.
 const WAYS_ALONG: [f32; 2] = [0.5, 0.95];
+
+/// A place of a surface, in its member's frame.
+#[derive(Clone, Copy)]
+pub struct Place {
+    pub position: Vec3,
+    pub normal: Vec3,
+    /// From there to where rays leave.
+    pub nudge: Vec3,
+    /// Length of the shortest edge around.
+    pub edge: f32,
+}
 
 #[derive(Clone)]
 pub struct Member {
@@ -674,14 +691,15 @@ impl GroupSpace<'_> {
         alongs.into_par_iter().zip(shares).zip(normals).zip(positions).map(nudge).collect()
     }
 
-    /// A point of the member's frame as seen from where it is nudged to.
-    pub fn see(&self, position: Vec3, normal: Vec3, nudge: Vec3, rays: Rays) -> Seen {
-        self.see_with(position, normal, nudge, rays, None)
+    /// What is seen of a place.
+    pub fn see(&self, vertex: Place, rays: Rays) -> Seen {
+        self.see_with(vertex, rays, None)
     }
 
-    fn see_with(&self, position: Vec3, normal: Vec3, nudge: Vec3, rays: Rays, in_map: Option<&[u32]>) -> Seen {
+    fn see_with(&self, Place { position, normal, nudge, edge }: Place, rays: Rays, in_map: Option<&[u32]>) -> Seen {
         let group = self.group;
-        let eye = Eye { origin: self.placed(position + nudge).into(), normal };
+        let near = NEAR * edge * self.scale();
+        let eye = Eye { origin: self.placed(position + nudge).into(), normal, near };
         let standing = &group.standings[self.member];
         let counts = Counts {
             blocks: &self.blocks,
@@ -697,7 +715,8 @@ impl GroupSpace<'_> {
             seen.cover();
         }
         let sees_backs = seen.blocked > BURIED_BLOCKED && seen.behind > BURIED_BACKS * seen.blocked;
-        seen.buried = group.plan.refinement.is_some() && (is_covered || sees_backs);
+        let is_close_behind = seen.near > BURIED_NEAR;
+        seen.buried = group.plan.refinement.is_some() && (is_covered || sees_backs || is_close_behind);
         seen
     }
 
@@ -900,6 +919,7 @@ impl GroupSpace<'_> {
         let order = &lit[self.member].order.vertices;
         // Few meshes have buried vertices, which alone ask for their triangles.
         let around = OnceLock::new();
+        let edges = shortest_edges(&mesh.positions, &mesh.triangles);
         let stride = channel_stride(plan.bands);
         let mut transfer = vec![0.0; mesh.positions.len() * stride];
         // Pixels of a grid read no maps: all members cast their own shadows there, whose edges are crisp. One with maps is
@@ -929,7 +949,8 @@ impl GroupSpace<'_> {
                     let normal = mesh.normals[v];
                     let nudge = nudges[v];
                     let in_map = has_maps.then_some(&in_map[..]);
-                    let see = |position| self.see_with(position, normal, nudge, Rays::Many, in_map);
+                    let at = |position| Place { position, normal, nudge, edge: edges[v] };
+                    let see = |position| self.see_with(at(position), Rays::Many, in_map);
                     let position = mesh.positions[v];
                     let here = see(position);
                     if !here.buried {
@@ -950,8 +971,13 @@ impl GroupSpace<'_> {
                         let corners = triangles.flat_map(|&triangle| mesh.triangles[triangle as usize]);
                         corners.filter(|corner| *corner as usize != v).map(|corner| mesh.positions[corner as usize])
                     };
-                    let free = |place: &Vec3| !self.see(*place, normal, nudge, Rays::Few).buried;
-                    let mut inwards = WAYS_OUT.iter().flat_map(|way| middles().map(|m| position.lerp(m, *way)));
+                    let is_free = |place: &Vec3, most_near: f64| {
+                        let seen = self.see(at(*place), Rays::Few);
+                        !seen.buried && seen.near <= most_near
+                    };
+                    let free = |place: &Vec3| is_free(place, 1.0);
+                    let inwards = || WAYS_OUT.iter().flat_map(|way| middles().map(|m| position.lerp(m, *way)));
+                    let open = inwards().find(|place| is_free(place, OPEN_NEAR));
                     let along = || {
                         let ways = WAYS_ALONG.iter().flat_map(|way| neighbours().map(|n| position.lerp(n, *way)));
                         let places: Vec<Vec3> = ways.filter(free).collect();
@@ -960,7 +986,7 @@ impl GroupSpace<'_> {
                         let is_beside = |place: &Vec3| !self.is_between(first + nudge, *place + nudge);
                         places.iter().all(is_beside).then_some(first)
                     };
-                    inwards.find(free).or_else(along).map_or(here, see)
+                    open.or_else(|| inwards().find(free)).or_else(along).map_or(here, see)
                 };
                 let linked = |place: usize| {
                     let mut seen = vertex(&cluster[place]);
@@ -1159,6 +1185,19 @@ fn is_within([a, b, c]: [[f32; 2]; 3], [x, y]: [f32; 2]) -> bool {
     sides.iter().all(|side| *side >= 0.0) || sides.iter().all(|side| *side <= 0.0)
 }
 
+/// The length of the shortest edge at every vertex; 0 where it has none.
+pub(super) fn shortest_edges(positions: &[Vec3], triangles: &[[u32; 3]]) -> Vec<f32> {
+    let mut shortest = vec![f32::INFINITY; positions.len()];
+    for &[a, b, c] in triangles {
+        for (from, to) in [(a, b), (b, c), (c, a)].map(|(from, to)| (from as usize, to as usize)) {
+            let length = positions[from].distance(positions[to]);
+            shortest[from] = shortest[from].min(length);
+            shortest[to] = shortest[to].min(length);
+        }
+    }
+    shortest.iter().map(|length| if length.is_finite() { *length } else { 0.0 }).collect()
+}
+
 /// The triangles around every vertex.
 pub(super) fn triangles_around(vertices: usize, triangles: &[[u32; 3]]) -> Vec<Vec<u32>> {
     let mut around = vec![Vec::new(); vertices];
@@ -1342,6 +1381,7 @@ impl GroupPlan {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::asset::generate;
 
     /// A wall and the flare at its foot, each with its own vertices in the groove, which have one normal: as files have
     /// them whose sides are islands of a texture.
@@ -1395,5 +1435,34 @@ mod tests {
         let found = seers(&plan);
         assert_eq!(found[0].1, -0.001);
         assert!(found[1].1 > 0.0 && found[1].1 == found[2].1, "{found:?}");
+    }
+
+    /// A board lies close above a floor, as a picture hangs on a wall: below its rim a vertex is dark, but its triangles,
+    /// which reach from there into the open, are not. Below a board on legs they are.
+    #[test]
+    fn vertices_close_behind_something_are_seen_from_beside_it() {
+        let floor = Arc::new(generate::plane(4.0, 8));
+        let corners = [[-0.6, -0.6], [0.6, -0.6], [0.6, 0.6], [-0.6, 0.6]];
+        let corners = corners.map(|[x, z]| Vec3::new(x, 0.0, z)).to_vec();
+        let board = Mesh::new("board", corners, vec![Vec3::NEG_Y; 4], None, vec![[0, 1, 2], [0, 2, 3]]).unwrap();
+        let board = Arc::new(board);
+        let light_below = |height: f32| {
+            let alone = GroupPlan::alone(&floor, &Options::default(), Wanted::BOTH);
+            let mut plan = GroupPlan { refinement: Some((1000, false)), ..alone };
+            let floor_member = Member { refines: false, ..plan.members[0].clone() };
+            let placement = Placement { position: height * Vec3::Y, ..AT_ORIGIN };
+            plan.members = vec![floor_member.clone(), Member { mesh: board.clone(), placement, ..floor_member }];
+            let surface = &plan.bake(&|_, _| ()).0[0];
+            let transfer = surface.transfer.as_ref().unwrap();
+            let at = |x: f32, z: f32| {
+                let at = surface.mesh.positions.iter().position(|place| *place == Vec3::new(x, 0.0, z)).unwrap();
+                transfer[at * channel_stride(plan.bands)] / (std::f32::consts::PI.sqrt() / 2.0)
+            };
+            [at(0.0, 0.0), at(0.5, 0.0)]
+        };
+        let close = light_below(0.03);
+        assert!(close[0] < 0.1 && close[1] > 0.9, "{close:?}");
+        let on_legs = light_below(0.3);
+        assert!(on_legs[0] < 0.3 && on_legs[1] < 0.8, "{on_legs:?}");
     }
 }

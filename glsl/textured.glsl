@@ -14,6 +14,7 @@ vec4 textured(sampler2D picture, vec2 uv) {
     float level = 0.5 * log2(square) - log2(taps) - FINER;
     vec2 way = (dot(x, x) > dot(y, y) ? along_x : along_y) / taps;
     vec2 first = uv - 0.5 * (taps - 1.0) * way;
+    // Lanes leave this loop one by one; on llvmpipe its sums are those of a loop of all taps, to the bit.
     vec4 sum = vec4(0.0);
     float i = 0.0;
     do {

@@ -9,13 +9,14 @@ layout(location = 1) out uvec4 seen_place;
 layout(location = 3) in vec2 uv;
 layout(binding = 4) uniform sampler2D picture;
 #include "holes.glsl"
+#include "textured.glsl"
 #endif
 #include "triangle_push.glsl"
 #include "seen_surface.glsl"
 
 void main() {
 #if HOLES
-    cut_holes(texture(picture, uv).a, push.alpha_cutoff);
+    cut_holes(textured(picture, uv).a, push.alpha_cutoff);
 #endif
     seen_triangle = pack_triangle(push.receiver, gl_FrontFacing, true, push.first + triangle);
     float step = max(length(dFdx(at)), length(dFdy(at)));

@@ -73,7 +73,7 @@ pub struct LightRange<'r> {
 pub struct Transfer {
     /// SH bands; a vector has bands^2 coefficients.
     pub bands: usize,
-    /// The vectors in the mesh's order of vertices, one after another.
+    /// The vectors in the order of vertices of [`Renderer::mesh`], one after another.
     pub coefficients: Vec<f32>,
 }
 
@@ -91,7 +91,8 @@ pub struct Renderer {
 
 impl Renderer {
     /// Bakes what the scene needs, or finds it in the cache, and builds the passes. A scene that states no exposure gets
-    /// the one that suits its light at its own time; a camera that was added to a file is placed for the picture's shape.
+    /// the one that suits its light at its own time, by a few rays; a camera that was added to a file is placed for the
+    /// picture's shape. [`Renderer::scene`] has both.
     ///
     /// # Errors
     /// As [`Frame::new`]; `Input` where an option is out of its range.
@@ -112,10 +113,14 @@ impl Renderer {
     ) -> Result<Self> {
         let frame_options = frame::Options { pictures: false, ..options.frame(scene)? };
         let mut scene = scene.clone();
+        // A scene that was put together by edits rests where it is now.
+        scene.rejoin();
         let time_s = scene.data.output.time_s;
         let aspect = f64::from(frame_options.size[0]) / f64::from(frame_options.size[1]);
         scene.fit_added_camera(aspect);
-        exposure::settle(&mut scene, time_s, aspect);
+        if let Some(said) = exposure::settle(&mut scene, time_s, aspect) {
+            log::info!("{said}");
+        }
         let folder = gpu.device().cache_dir.clone();
         let cache = options.cache.clone().unwrap_or_else(|| Cache::new(folder.as_deref()));
         let baker = Baker::new(gpu.device(), &Library { shader_dir: None, cache_dir: folder });
@@ -151,8 +156,12 @@ impl Renderer {
             }
         }
         if let Some(entity) = self.frame.groups.displaced(self.frame.scene(), &self.stood, placements) {
-            let why = "the scene has it stand elsewhere among what it never moves against: let it be `movable`";
-            return Err(Error::Input(format!("{:?}: {why}", entities[entity].name)));
+            let why = if self.frame.scene().is_at_rest(entity) {
+                "it rests in the scene"
+            } else {
+                "it has left its place among what the same nodes carry"
+            };
+            return Err(Error::Input(format!("{:?}: {why}; `movable` lets it stand anywhere", entities[entity].name)));
         }
         self.light.clear();
         self.frame.render(placements, None)?;

@@ -229,7 +229,7 @@ pub struct Eye {
     pub origin: Vec3,
     /// Unit normal in the object's frame.
     pub normal: Vec3,
-    /// How near things are that lie upon the surface, in the blockers' frame.
+    /// Distance below which a hit counts as near, in the blockers' frame.
     pub near: f32,
 }
 

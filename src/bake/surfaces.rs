@@ -31,7 +31,7 @@ use std::sync::{Arc, OnceLock};
 use std::time::Instant;
 
 /// Counts in every name of the cache: another number where a bake of surfaces computes something else.
-const VERSION: u32 = 63;
+const VERSION: u32 = 64;
 /// How far towards the middle of its triangles a vertex is seen from, as a share of the way: the light of a crease is
 /// that just inside each face. Where meshes are left as they are, so are the places from which they are seen.
 const NUDGE: f32 = 0.02;
@@ -72,9 +72,9 @@ pub(super) const BURIED_BACKS: f64 = 0.5;
 /// Share of it that is blocked there at least.
 pub(super) const BURIED_BLOCKED: f64 = 0.35;
 /// Share of it that is blocked by what is nearer than a share of the edges around, as behind a picture on a wall: it is
-/// dark there, and nowhere else on the triangles.
-const BURIED_NEAR: f64 = 0.7;
-const NEAR: f32 = 0.4;
+/// dark there, and nowhere else on the triangles. In a corner of three walls 0.75 is.
+const BURIED_NEAR: f64 = 0.8;
+const NEAR: f32 = 0.5;
 /// Share that is blocked so at a place that is taken first in its stead.
 const OPEN_NEAR: f64 = 0.1;
 /// Vertices are of one side if their normals have such a cosine with the mean, and if they lie apart along it by no more
@@ -93,13 +93,13 @@ const WAYS_OUT: [f32; 5] = [0.06, 0.15, 0.3, 0.5, 0.8];
 const WAYS_ALONG: [f32; 2] = [0.5, 0.95];
 
 /// A place of a surface, in its member's frame.
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, Debug)]
 pub struct Place {
     pub position: Vec3,
     pub normal: Vec3,
     /// From there to where rays leave.
     pub nudge: Vec3,
-    /// Length of the shortest edge around.
+    /// Length of the shortest edge around; with 0 nothing is close.
     pub edge: f32,
 }
 
@@ -692,8 +692,8 @@ impl GroupSpace<'_> {
     }
 
     /// What is seen of a place.
-    pub fn see(&self, vertex: Place, rays: Rays) -> Seen {
-        self.see_with(vertex, rays, None)
+    pub fn see(&self, place: Place, rays: Rays) -> Seen {
+        self.see_with(place, rays, None)
     }
 
     fn see_with(&self, Place { position, normal, nudge, edge }: Place, rays: Rays, in_map: Option<&[u32]>) -> Seen {
@@ -977,7 +977,8 @@ impl GroupSpace<'_> {
                     };
                     let free = |place: &Vec3| is_free(place, 1.0);
                     let inwards = || WAYS_OUT.iter().flat_map(|way| middles().map(|m| position.lerp(m, *way)));
-                    let open = inwards().find(|place| is_free(place, OPEN_NEAR));
+                    let is_close_behind = here.near > BURIED_NEAR;
+                    let open = is_close_behind.then(|| inwards().find(|place| is_free(place, OPEN_NEAR))).flatten();
                     let along = || {
                         let ways = WAYS_ALONG.iter().flat_map(|way| neighbours().map(|n| position.lerp(n, *way)));
                         let places: Vec<Vec3> = ways.filter(free).collect();
@@ -1186,7 +1187,7 @@ fn is_within([a, b, c]: [[f32; 2]; 3], [x, y]: [f32; 2]) -> bool {
 }
 
 /// The length of the shortest edge at every vertex; 0 where it has none.
-pub(super) fn shortest_edges(positions: &[Vec3], triangles: &[[u32; 3]]) -> Vec<f32> {
+fn shortest_edges(positions: &[Vec3], triangles: &[[u32; 3]]) -> Vec<f32> {
     let mut shortest = vec![f32::INFINITY; positions.len()];
     for &[a, b, c] in triangles {
         for (from, to) in [(a, b), (b, c), (c, a)].map(|(from, to)| (from as usize, to as usize)) {
@@ -1464,5 +1465,26 @@ mod tests {
         assert!(close[0] < 0.1 && close[1] > 0.9, "{close:?}");
         let on_legs = light_below(0.3);
         assert!(on_legs[0] < 0.3 && on_legs[1] < 0.8, "{on_legs:?}");
+    }
+
+    #[test]
+    fn corners_of_a_room_are_not_buried() {
+        let cube = generate::cuboid(Vec3::ONE, 4);
+        let triangles = cube.triangles.iter().map(|[a, b, c]| [*a, *c, *b]).collect();
+        let normals = cube.normals.iter().map(|normal| -*normal).collect();
+        let room = Arc::new(Mesh::new("room", cube.positions.clone(), normals, None, triangles).unwrap());
+        let alone = GroupPlan::alone(&room, &Options::default(), Wanted::BOTH);
+        let plan = GroupPlan { refinement: Some((1000, false)), ..alone };
+        let group = Group::new(&plan);
+        let space = group.space(0);
+        let nudges = space.nudges(&room.positions, &room.normals, &room.triangles);
+        let mut most_near = 0.0_f64;
+        for (v, edge) in shortest_edges(&room.positions, &room.triangles).into_iter().enumerate() {
+            let place = Place { position: room.positions[v], normal: room.normals[v], nudge: nudges[v], edge };
+            let seen = space.see(place, Rays::Few);
+            assert!(!seen.buried, "{place:?} {} near", seen.near);
+            most_near = most_near.max(seen.near);
+        }
+        assert!(most_near > 0.6, "a corner has walls close by: {most_near}");
     }
 }

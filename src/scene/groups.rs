@@ -22,7 +22,7 @@ pub struct Groups {
 
 impl Groups {
     /// The groups of a scene: all entities at rest are one, and so are those that one node carries, as the pieces of a
-    /// car, less those that were taken out (`Scene::loosen`). Whatever else moves is a group by itself.
+    /// car, less those that are movable or were taken out (`Scene::loosen`). Whatever else moves is a group by itself.
     ///
     /// Lights in bands (`--lights sh`) meet what lies before them in the chain of a vertex, so that every entity is a
     /// group by itself there.
@@ -80,8 +80,8 @@ impl Groups {
         self.of[a] == self.of[b]
     }
 
-    /// The first entity that has left its place in its group: what rests stands as in `stood`, and what is carried stands
-    /// so against the first member. Rounding is allowed for.
+    /// The first entity that rests and does not stand as in `stood`, or that is carried and does not stand so against the
+    /// first member of its group. Rounding is allowed for.
     pub fn displaced(&self, scene: &Scene, stood: &[Placement], placements: &[Placement]) -> Option<usize> {
         let world = Placement { position: Vec3::ZERO, rotation: Quat::IDENTITY, scale: 1.0 };
         let is_displaced = |entity: usize| {
@@ -92,9 +92,13 @@ impl Groups {
             let turn = frames[1].turn() * frames[0].turn().inverse() * was.turn();
             let scale = was.scale / frames[0].scale * frames[1].scale;
             let radius_m = scene.meshes[scene.entities[entity].mesh].bounding_sphere().1 * scale;
-            let rounding_m = 1e-6 * expected.length().max(frames[0].local(was.position.as_dvec3()).length());
+            let ratio = f64::from(frames[1].scale / frames[0].scale);
+            let numbers_m = ratio * f64::from(was.position.length() + frames[0].position.length())
+                + expected.length()
+                + f64::from(frames[1].position.length());
+            let rounding_m = 1e-6 * numbers_m;
             expected.distance(is.position.as_dvec3()) > 1e-4 * f64::from(radius_m) + rounding_m
-                || turn.dot(is.turn()).abs() < 1.0 - 1e-6
+                || turn.dot(is.turn()).abs() < 1.0 - 1e-9
                 || (is.scale / scale - 1.0).abs() > 1e-4
         };
         (0..scene.data.entities.len()).find(|&entity| is_displaced(entity))

@@ -358,7 +358,6 @@ impl Scene {
     }
 
     /// Puts all entities that were taken out back into their groups. Returns whether there were any.
-    #[cfg(feature = "view")]
     pub(crate) fn rejoin(&mut self) -> bool {
         !std::mem::take(&mut self.loose).is_empty()
     }
@@ -457,7 +456,7 @@ impl Scene {
     /// The box in the world that an entity stays in as it moves, metres; `None` where it may be put anywhere.
     pub(crate) fn reach(&self, entity: usize) -> Option<[DVec3; 2]> {
         const TIMES: usize = 128;
-        let data = self.data.entities.get(entity).filter(|data| !data.motion.is_empty())?;
+        let data = self.data.entities.get(entity).filter(|data| !data.motion.is_empty() && !data.movable)?;
         let spans = data.motion.iter().map(Motion::span_s);
         let [from_s, to_s] = spans.fold([f64::MAX, f64::MIN], |[low, high], [from, to]| [low.min(from), high.max(to)]);
         let extent = self.meshes[self.entities[entity].mesh].extent();

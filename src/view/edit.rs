@@ -241,7 +241,7 @@ pub fn pieces(data: &Data, entity: usize) -> Vec<usize> {
     let Some(mesh) = mesh_of(own).filter(|mesh| mesh.piece.is_some()) else { return vec![entity] };
     let stands_with = |other: &EntityData| {
         (other.position, other.rotation, other.scale) == (own.position, own.rotation, own.scale)
-            && other.motion == own.motion
+            && (&other.motion, other.movable) == (&own.motion, own.movable)
     };
     let is_cut_from_it = |other: &MeshData| {
         other.piece.is_some() && (&other.file, other.part, other.pose) == (&mesh.file, mesh.part, mesh.pose)

@@ -145,6 +145,8 @@ mod tests {
         assert!(groups.is_own(0, 3) && !groups.is_own(0, 1));
         scene.loosen(0);
         assert_eq!(Groups::new(&scene, Lights::Sharp).members(), [vec![0], vec![1], vec![2, 3]]);
+        scene.data.entities[3].movable = true;
+        assert_eq!(Groups::new(&scene, Lights::Sharp).members(), [[0], [1], [2], [3]]);
         assert_eq!(Groups::alone(&scene).members(), [[0], [1], [2], [3]]);
     }
 

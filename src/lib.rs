@@ -30,11 +30,12 @@
 //! - Small occluders: an occluder whose bounding sphere has a half-angle below 12 degrees blocks a point. It takes away
 //!   the chain's value in its direction times the solid angle of a projected area, which is fitted to its outermost
 //!   shell ([`field::Area`]). Up to 16 degrees the point and the field share.
-//! - Rigid groups: entities without motion, but for `movable` ones, are one group, and so are those that the same nodes carry. A vertex's own
-//!   visibility is cast by rays past its whole group, so members leave each other's chains; under sharp lights a member
-//!   that is convex, or farther than 0.65 of its bounding radii and not around what it blocks, keeps its silhouette.
-//!   What moves among many of them reads the sky past all at once, from nodes of the box in which it moves
-//!   ([`field::visibility_volume`]). With `--lights sh`, and without the skip `static`, every entity is alone.
+//! - Rigid groups: entities without motion, but for `movable` ones, are one group, and so are those that the same
+//!   nodes carry. A vertex's own visibility is cast by rays past its whole group, so members leave each other's
+//!   chains; under sharp lights a member that is convex, or farther than 0.65 of its bounding radii and not around
+//!   what it blocks, keeps its silhouette. What moves among many of them reads the sky past all at once, from nodes
+//!   of the box in which it moves ([`field::visibility_volume`]). With `--lights sh`, and without the skip
+//!   `static`, every entity is alone.
 //! - Surfaces: a mesh is lit and drawn with more vertices where its own visibility varies, and along the shadows of suns
 //!   ([`bake::surfaces`]). Vertices of what rests know from rays whether its own group hides a sun. Pixels that evaluate
 //!   lights look up a map of all that rests as the sun sees it ([`draw::sun_map`]); outlines hide the sun for vertices, where

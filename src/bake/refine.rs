@@ -71,7 +71,7 @@ fn edge(a: u32, b: u32) -> Edge {
     (a.min(b), a.max(b))
 }
 
-fn sides([a, b, c]: [u32; 3]) -> [Edge; 3] {
+pub(super) fn sides([a, b, c]: [u32; 3]) -> [Edge; 3] {
     [edge(a, b), edge(b, c), edge(c, a)]
 }
 

@@ -5,7 +5,7 @@ use super::cluster_order::{ClusterOrder, cluster_order};
 use super::links::{Link, Met, Runs, links, side};
 use super::own_visibility::{Counts, Eye, Front, PATTERN, Rays, Seen, Standing, Target, directions, see};
 use super::packet::{BlockerHit, BlockerTriangle, Blockers, Mask};
-use super::refine::{FLAT, Limits, ON_TRIANGLE, Refined, refine};
+use super::refine::{FLAT, Limits, ON_TRIANGLE, Refined, refine, sides};
 use super::triangles::{distinct, weights};
 use super::visibility_volume::VolumePlan;
 use super::{BakeReport, Options, Progress, TRANSFER_OFFSET, Wanted, bakes_transfer};
@@ -971,23 +971,28 @@ impl GroupSpace<'_> {
                         let corners = triangles.flat_map(|&triangle| mesh.triangles[triangle as usize]);
                         corners.filter(|corner| *corner as usize != v).map(|corner| mesh.positions[corner as usize])
                     };
-                    let is_free = |place: &Vec3, most_near: f64| {
-                        let seen = self.see(at(*place), Rays::Few);
-                        !seen.buried && seen.near <= most_near
-                    };
-                    let free = |place: &Vec3| is_free(place, 1.0);
-                    let inwards = || WAYS_OUT.iter().flat_map(|way| middles().map(|m| position.lerp(m, *way)));
-                    let is_close_behind = here.near > BURIED_NEAR;
-                    let open = is_close_behind.then(|| inwards().find(|place| is_free(place, OPEN_NEAR))).flatten();
+                    let few = |place: Vec3| self.see(at(place), Rays::Few);
+                    let most_near = if here.near > BURIED_NEAR { OPEN_NEAR } else { 1.0 };
+                    let mut free = None;
+                    for place in WAYS_OUT.iter().flat_map(|way| middles().map(|m| position.lerp(m, *way))) {
+                        let seen = few(place);
+                        if seen.buried {
+                            continue;
+                        }
+                        if seen.near <= most_near {
+                            return see(place);
+                        }
+                        free.get_or_insert(place);
+                    }
                     let along = || {
                         let ways = WAYS_ALONG.iter().flat_map(|way| neighbours().map(|n| position.lerp(n, *way)));
-                        let places: Vec<Vec3> = ways.filter(free).collect();
+                        let places: Vec<Vec3> = ways.filter(|place| !few(*place).buried).collect();
                         let first = *places.first()?;
                         // On both sides of a wall there is no light that suits both.
                         let is_beside = |place: &Vec3| !self.is_between(first + nudge, *place + nudge);
                         places.iter().all(is_beside).then_some(first)
                     };
-                    open.or_else(|| inwards().find(free)).or_else(along).map_or(here, see)
+                    free.or_else(along).map_or(here, see)
                 };
                 let linked = |place: usize| {
                     let mut seen = vertex(&cluster[place]);
@@ -1189,12 +1194,10 @@ fn is_within([a, b, c]: [[f32; 2]; 3], [x, y]: [f32; 2]) -> bool {
 /// The length of the shortest edge at every vertex; 0 where it has none.
 fn shortest_edges(positions: &[Vec3], triangles: &[[u32; 3]]) -> Vec<f32> {
     let mut shortest = vec![f32::INFINITY; positions.len()];
-    for &[a, b, c] in triangles {
-        for (from, to) in [(a, b), (b, c), (c, a)].map(|(from, to)| (from as usize, to as usize)) {
-            let length = positions[from].distance(positions[to]);
-            shortest[from] = shortest[from].min(length);
-            shortest[to] = shortest[to].min(length);
-        }
+    for (from, to) in triangles.iter().flat_map(|triangle| sides(*triangle)) {
+        let ends = [from, to].map(|v| v as usize);
+        let length = positions[ends[0]].distance(positions[ends[1]]);
+        ends.iter().for_each(|&v| shortest[v] = shortest[v].min(length));
     }
     shortest.iter().map(|length| if length.is_finite() { *length } else { 0.0 }).collect()
 }

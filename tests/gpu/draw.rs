@@ -345,7 +345,8 @@ fn stripes_seen_along_them_stay_apart() {
     let scene = scene.build().unwrap();
     for antialias in [Antialias::None, Antialias::Samples] {
         let picture = gpu.picture(&scene, options(antialias), f32::INFINITY);
-        let (mut off, mut compared) = (0.0, 0);
+        let mut off = 0.0;
+        let mut compared = 0;
         for (i, pixel) in picture.chunks_exact(3).enumerate() {
             let slope = 20.0_f32.to_radians().tan() / 32.0;
             let down = slope * ((i / WIDTH) as f32 + 0.5 - 32.0);

@@ -70,10 +70,10 @@ impl Cache {
         if let Some(path) = path.as_ref().filter(|path| path.exists()) {
             let why = match read(path) {
                 Ok(Some(found)) => return Ok((Arc::new(found), None)),
-                Ok(None) => "it does not fit its name".into(),
+                Ok(None) => format!("{}: it does not fit its name", path.display()),
                 Err(error) => error.to_string(),
             };
-            log::warn!("{}: {why}; baking anew", path.display());
+            log::warn!("{why}; baking anew");
         }
         let (made, report) = make()?;
         let made = Arc::new(made);

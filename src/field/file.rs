@@ -23,7 +23,6 @@ pub const SURFACES_MAGIC: [u8; 8] = *b"SHSURFA\n";
 pub const VOLUME_MAGIC: [u8; 8] = *b"SHVOLUM\n";
 /// Version that this program writes and reads. It increases whenever the meaning of header or payload changes.
 pub const VERSION: u32 = 15;
-const HEADER_LIMIT: u64 = 64 << 10;
 /// Largest payload that is read: 4 GiB.
 pub const PAYLOAD_LIMIT: u64 = 4 << 30;
 const PROLOGUE: usize = 56;
@@ -74,8 +73,8 @@ pub fn read_from<H: DeserializeOwned>(
     }
     let header_len = u64::from(word(12));
     let payload_len = u64::from_le_bytes(prologue[16..24].try_into().expect("eight bytes"));
-    if header_len > HEADER_LIMIT || payload_len > PAYLOAD_LIMIT {
-        return Err(bad(format!("claims a header of {header_len} and a payload of {payload_len} bytes")));
+    if payload_len > PAYLOAD_LIMIT {
+        return Err(bad(format!("claims a payload of {payload_len} bytes")));
     }
     if PROLOGUE as u64 + header_len + payload_len != size {
         return Err(bad(format!(

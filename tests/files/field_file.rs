@@ -62,6 +62,16 @@ fn round_trip() {
     }
 }
 
+/// A scene of thousands of entities has a header of megabytes.
+#[test]
+fn a_long_header_comes_back() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("long.view");
+    let header: Vec<u32> = (0..1_000_000).collect();
+    file::write(&path, SURFACES_MAGIC, &header, &[1, 2, 3]).unwrap();
+    assert_eq!(file::read::<Vec<u32>>(&path, SURFACES_MAGIC).unwrap(), (header, vec![1, 2, 3]));
+}
+
 #[test]
 fn every_cut_and_every_flipped_bit_is_refused() {
     let folder = tempfile::tempdir().unwrap();

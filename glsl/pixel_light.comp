@@ -27,6 +27,11 @@ uvec2 self_cell(uint i) {
 }
 #include "self_visibility.glsl"
 #endif
+layout(push_constant) uniform Push {
+    uint list;     // which of the steps' lists
+    uint texel_px; // width of a place in pixels
+} push;
+
 #define FACINGS 3
 #define BLENDS 1
 #define SHOWN_QUADS 1 // of further lights vertices have the shares
@@ -50,11 +55,6 @@ layout(binding = 13) uniform texture2D depths;
 #include "pixel_work.glsl"
 layout(binding = 17, rgba32ui) uniform writeonly uimage2D light;
 
-layout(push_constant) uniform Push {
-    uint list;     // which of the steps' lists
-    uint texel_px; // width of a place in pixels
-} push;
-
 // The light of a surface: of its chain and of the rest, or where there is no chain or no edge as vertices have it.
 uvec4 light_of_surface(SeenSurface seen, float depth) {
     Entity receiver = ENTITY(seen.receiver);
@@ -77,16 +77,16 @@ uvec4 light_of_surface(SeenSurface seen, float depth) {
     surface.origin = receiver.centre.xyz;
     surface.inverse_radius = receiver.centre.w;
     surface.step = receiver.scale * float(push.texel_px) * seen.step;
-#if SUN_MAPS
+#if MAPS
     surface.ground = normalize(to_world(receiver, cross(corners[1] - corners[0], corners[2] - corners[0])));
-    surface.sun_maps = receiver.sun_maps;
+    surface.light_maps = receiver.light_maps;
     surface.lifted = vec3(0.0);
     surface.is_round = false;
 #endif
     [[unroll]] for (uint i = 0; i < FACINGS; i++) {
         vec3 normal = texelFetch(vertices, int(2 * (by_pixel.z + own[i]) + 1)).xyz;
         surface.facings[i] = facing_of(receiver, normal, seen.weights[i], by_pixel.w, own[i]);
-#if SUN_MAPS
+#if MAPS
         float below = max(dot(corners[i] - at, normal), 0.0);
         surface.lifted += receiver.scale * seen.weights[i] * below * surface.facings[i].normal;
         surface.is_round = surface.is_round || dot(surface.facings[i].normal, surface.ground) < FLAT;

@@ -95,8 +95,15 @@ struct Facing {
 #endif
 };
 
-#if SUN_MAPS && BLENDS
+#define MAPS (SUN_MAPS || LAMP_MAPS)
+#if MAPS && BLENDS
+const mat2 NEXT_TAP = mat2(-0.7373688, 0.6754903, -0.6754903, -0.7373688); // the golden angle
+#if SUN_MAPS
 #include "sun_map.glsl"
+#endif
+#if LAMP_MAPS
+#include "lamp_map.glsl"
+#endif
 uint current_map; // bit of the current light's map, or 0
 #endif
 
@@ -108,11 +115,11 @@ struct Surface {
 #if EDGES
     float step;    // farthest that a neighbouring vertex or pixel is, metres
 #endif
-#if SUN_MAPS && BLENDS
+#if MAPS && BLENDS
     vec3 ground;   // normal of the triangle, world
     vec3 lifted;   // to the round surface that the triangle stands for (Hanika, Ray Tracing Gems II, chapter 4), metres
     bool is_round; // whether it stands for one
-    uint sun_maps; // that its object stands in
+    uint light_maps; // that its object stands in
 #endif
 };
 
@@ -390,8 +397,8 @@ vec4 part_shares(Surface surface, SeenLight light, Block block) {
 #if SELF
             // A part's radius is small enough for its sine to stand for it.
             bool shadows = facing.self_first != NONE;
-#if SUN_MAPS && BLENDS
-            shadows = shadows && (surface.sun_maps & current_map) == 0;
+#if MAPS && BLENDS
+            shadows = shadows && (surface.light_maps & current_map) == 0;
 #endif
             vec3 toward = direction;
             float far = reach;
@@ -601,8 +608,8 @@ vec3 chain_sum(Surface surface, uint i, uint end) {
     bool hides_around = (told & ALL_SUNS << MOST_SUNS) != 0;
     i = hides_around ? end : i;
 #endif
-#if SUN_MAPS && BLENDS
-    current_map = shining.sun_maps;
+#if MAPS && BLENDS
+    current_map = shining.light_maps;
 #endif
     uint first_block = light.fine >= 1.0 ? 1 : 0, last_block = light.fine <= 0.0 ? 0 : 4;
     // Irradiance by the parts of each block, all of which are added up whatever blocks a light has: on lavapipe lanes that
@@ -722,6 +729,42 @@ vec3 chain_sum(Surface surface, uint i, uint end) {
         }
     } while (is_kind(packed, ENTRY_GLOBE));
 #endif
+#if LAMP_MAPS && BLENDS
+    if (current_map >= uint(LAMP_BIT)) {
+        uint first = 4 * (findMSB(current_map) - findMSB(LAMP_BIT)), k = 0;
+        vec3 place = surface.position + surface.lifted;
+        vec3 ground = dot(surface.ground, surface.facings[0].normal) < 0.0 ? -surface.ground : surface.ground;
+        mat2x3 edges = mat2x3(light.across, light.down) * (light.sine * light.distance);
+        bool square = false;
+#if PANELS
+        mat3 axes = mat3(light.toward, light.across, light.down);
+        square = is_rectangle(light);
+        vec2 strip = light.ratio < 1.0 ? vec2(0.25, 1.0) : vec2(1.0, 0.25);
+        vec2 scale = is_strip(light) ? strip : vec2(square ? 0.5 : 1.0);
+        mat2x3 half_edges = mat2x3(axes * (scale.x * light.half_edges[0]), axes * (scale.y * light.half_edges[1]));
+        edges[0] = is_panel(light) ? half_edges[0] : edges[0];
+        edges[1] = is_panel(light) ? half_edges[1] : edges[1];
+#endif
+        float seen[4] = float[](1.0, 1.0, 1.0, 1.0), most_steps[4] = float[](0.0, 0.0, 0.0, 0.0);
+        uint parts;
+        do {
+            LampMap map = lamp_map_at(first + k);
+            parts = map.parts;
+            float steps;
+            seen[k] = lamp_share(map, k, place + (surface.origin - map.middle), ground, surface.is_round, edges, square,
+                                 surface.step, steps);
+            most_steps[k] = steps;
+            k++;
+        } while (k < parts);
+        bool whole = lamp_map_at(first).parts == 1; // read again behind the loop, as above
+        vec4 open = vec4(seen[0], whole ? seen[0] : seen[1], whole ? seen[0] : seen[2], whole ? seen[0] : seen[3]);
+        set_block(shares, 0, open * of_block(shares, 0));
+        EACH for (uint part = 0; part < 4; part++) {
+            set_block(shares, part + 1, open[part] * of_block(shares, part + 1));
+        }
+        nearest = max(max(nearest, max(most_steps[0], most_steps[1])), max(most_steps[2], most_steps[3]));
+    }
+#endif
     float passed = 0.0;
 #if COLORS
     bool has_colors = shining.radiance_base != NONE;
@@ -744,16 +787,17 @@ vec3 chain_sum(Surface surface, uint i, uint end) {
         b++;
     } while (b < BLOCKS);
 #if SUN_MAPS && BLENDS
-    if (current_map != 0) {
+    if ((current_map & uint(LAMP_BIT - 1)) != 0) {
         SunMap map = sun_map_at(max(findLSB(current_map), 0));
         vec3 place = surface.position + surface.lifted + (surface.origin - map.middle);
         float steps;
         passed *= sun_share(map, place, surface.ground, surface.is_round, surface.step, steps);
         nearest = max(nearest, steps);
     }
-#elif SUN_MAPS && KEEPS
+#endif
+#if MAPS && KEEPS
     // Pixels look up the map, but for where all around is hidden.
-    bool is_mapped = shining.sun_maps != 0;
+    bool is_mapped = shining.light_maps != 0;
     nearest = is_mapped && !hides_around ? MOST_STEPS : nearest;
     unblocked = is_mapped ? open_share : unblocked;
 #endif
@@ -765,8 +809,8 @@ vec3 chain_sum(Surface surface, uint i, uint end) {
     cone *= cone;
 #if EDGES
     bool hidden = covered == (2u << last_block) - (1u << first_block);
-#if SUN_MAPS
-    hidden = hidden && shining.sun_maps == 0;
+#if MAPS
+    hidden = hidden && shining.light_maps == 0;
 #endif
     finest = hidden ? 0.0 : nearest;
     find_rim(ramp, shining, surface.step / max(light.distance, 1e-30));

@@ -1,5 +1,5 @@
 #version 460
-// Keeps how near to the sun a surface is.
+// Keeps how near to the light a surface is.
 layout(location = 0) out float height;
 #if HOLES
 layout(location = 0) in vec2 uv;

@@ -36,8 +36,6 @@ float gap_beside(SunMap map, Sunned at, vec2 off) {
     return texel == within && height > 0.0 ? gap : -1.0;
 }
 
-const mat2 NEXT_TAP = mat2(-0.7373688, 0.6754903, -0.6754903, -0.7373688); // the golden angle
-
 // `place`: from the map's middle, metres. `step`: as that of Surface. `steps`: of them in half the width of a penumbra that
 // comes as near, or 0.
 float sun_share(SunMap map, vec3 place, vec3 normal, bool is_round, float step, out float steps) {

@@ -1,5 +1,5 @@
 #version 460
-// A corner of a triangle as a sun sees it.
+// A corner of a triangle as a sun or a lamp sees it.
 layout(location = 0) in vec3 position;
 #if HOLES
 layout(location = 1) in vec3 paint; // texture coordinates and tint

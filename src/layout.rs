@@ -114,10 +114,14 @@ shared_struct! {
         /// Of a sun: the bits that a vertex has of it, see [`pack_suns`]; the last where nothing moves or lets light
         /// through that may hide a sun of which a vertex sees all. 0 of any other light.
         sun_bits: u32,
-        /// Of a sun the bit of its map, if it has one; of what occludes those of the maps that hold it.
-        sun_maps: u32,
+        /// Of a light the bit of its map, if it has one; of what occludes those of the maps that hold it.
+        light_maps: u32,
     }
 }
+
+/// The most suns that have maps, whose bits come first, and the most other lights.
+pub const MOST_SUN_MAPS: usize = 2;
+pub const MOST_LAMP_MAPS: usize = 32 - MOST_SUN_MAPS;
 
 /// The most suns of which vertices tell whether they are hidden.
 pub const MOST_SUNS: usize = 8;
@@ -184,6 +188,23 @@ shared_struct! {
         /// Its middle in the world: with numbers that begin there, what lies far from the origin is as exact as any.
         middle: [f32; 3],
         unused: f32,
+    }
+}
+
+shared_struct! {
+    /// A cube map of what rests around a part of a lamp ([`crate::draw::lamp_map`]): `LampMap` of the shaders.
+    LampMap {
+        /// Of the part, world, metres.
+        middle: [f32; 3],
+        /// The distance along a face's axis that 1 stands for, metres.
+        nearest_m: f32,
+        /// 1 over the distance of the nearest thing, 1/m.
+        most_inverse: f32,
+        side_px: f32,
+        /// Of its six faces.
+        first_texel: u32,
+        /// Parts of the lamp, 1 or 4, whose maps follow each other.
+        parts: u32,
     }
 }
 
@@ -277,6 +298,8 @@ pub fn glsl(file: &str) -> Option<String> {
         "structs.glsl" => glsl_struct("Entity", DeviceEntity::FIELDS) + &glsl_struct("Cluster", Cluster::FIELDS),
         "gloss_structs.glsl" => glsl_struct("GlossEntity", GlossEntity::FIELDS),
         "sun_map_structs.glsl" => glsl_struct("SunMap", SunMap::FIELDS),
+        "lamp_map_structs.glsl" => glsl_struct("LampMap", LampMap::FIELDS),
+        "lamp_map_at.glsl" => glsl_reader("LampMap lamp_map_at", "lamp_maps", "vec4", LampMap::FIELDS),
         "sun_map_at.glsl" => glsl_reader("SunMap sun_map_at", "sun_maps", "vec4", SunMap::FIELDS),
         "entity_at.glsl" => glsl_reader("Entity entity_at", "entities", "vec4", DeviceEntity::FIELDS),
         "cluster_at.glsl" => glsl_reader("Cluster cluster_at", "clusters", "uvec2", Cluster::FIELDS),

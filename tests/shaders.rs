@@ -83,6 +83,7 @@ fn sharp_way(bits: u32) -> SharpPermutation {
         cuboids: on(1) != on(2),
         globes: on(3),
         sun_maps: on(1) != on(4),
+        lamp_maps: on(0) != on(4),
         gloss: on(0),
         many_shown: on(0) && on(1),
         lamps: on(0),

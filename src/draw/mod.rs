@@ -7,6 +7,7 @@
 
 pub mod camera;
 pub mod grid;
+pub mod lamp_map;
 pub mod mirror;
 pub mod pixel_light;
 pub mod show;

@@ -15,6 +15,7 @@
 //! runs for few pixels of each block of them.
 
 use crate::draw::grid::{self, BLOCK_CELLS};
+use crate::draw::lamp_map::LampMaps;
 use crate::draw::sun_map::{SUN_BINDING, SunMaps};
 use crate::draw::triangles::DrawnTriangles;
 use crate::draw::{DEPTH, DrawnEntity, DrawnMesh, DrawnPaint, DrawnViewport, PipelineMaker, made_once};
@@ -83,6 +84,8 @@ pub struct PixelLight<'d> {
     pub irradiances: &'d Buffer,
     /// Maps of suns, where the scene has any.
     pub sun_maps: Option<&'d SunMaps>,
+    /// Maps of lamps, where any has one.
+    pub lamp_maps: Option<&'d LampMaps>,
 }
 
 /// Texel views of buffers, in the order of their bindings.
@@ -316,7 +319,10 @@ impl LightImages {
     }
 
     pub fn evaluate_row(sharp: &SharpPermutation) -> ShaderPermutation {
-        sharp.pixel_row(ShaderPermutation::new("pixel_light.comp", 4)).define("SUN_BINDING", SUN_BINDING)
+        sharp
+            .pixel_row(ShaderPermutation::new("pixel_light.comp", 4))
+            .define("SUN_BINDING", SUN_BINDING)
+            .define("LAMP_BINDING", SUN_BINDING + 2)
     }
 
     /// Finds the light of pixels in the viewports whose pixels evaluate lights.
@@ -390,9 +396,14 @@ impl LightImages {
         let mut binds = light.binds(viewport.radiosity)?;
         binds.splice(11..14, [seen, places, depth]);
         binds.extend([work, Bind::Image(found)]);
-        if let Some(SunMaps { heights, maps, .. }) = light.sun_maps {
-            binds.extend(texels(&[(maps, QUAD_FORMAT)])?);
-            binds.push(Bind::Image(heights));
+        binds.extend(match light.sun_maps {
+            Some(SunMaps { heights, maps }) => {
+                [TexelView::new(maps, QUAD_FORMAT).map(Bind::Texel)?, Bind::Image(heights)]
+            }
+            None => [Bind::None, Bind::None],
+        });
+        if let Some(LampMaps { texels: found, maps }) = light.lamp_maps {
+            binds.extend(texels(&[(maps, QUAD_FORMAT), (found, vk::Format::R32_SFLOAT)])?);
         }
         let push = EvaluatePush { list: step as u32, texel_px };
         let groups = (&self.work, PixelWork::STEPS_AT + PixelWork::STEP_BYTES * step as u64);

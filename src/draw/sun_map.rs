@@ -18,8 +18,6 @@ use glam::{DMat4, DVec2, DVec3, DVec4};
 use std::f64::consts::FRAC_PI_2;
 use std::sync::Arc;
 
-/// The most suns that have maps.
-pub const MOST_MAPS: usize = 2;
 /// Texels along the longer side of a map: as many as make them 3 mm wide, within these limits.
 const SIDE_PX: [f64; 2] = [1024.0, 4096.0];
 const TEXEL_M: f64 = 0.003;
@@ -28,12 +26,15 @@ const TURNS: u32 = 12;
 /// Share of its height by which a map reaches beyond what it holds.
 const MARGIN: f64 = 1e-3;
 
-const HEIGHT: vk::Format = vk::Format::R32_SFLOAT;
+pub(super) const HEIGHT: vk::Format = vk::Format::R32_SFLOAT;
 /// First of the two bindings of maps in the shader that looks them up.
 pub const SUN_BINDING: u32 = 18;
 
 /// What maps hold.
 pub struct MapCaster<'d> {
+    pub entity: usize,
+    /// Whether it may hide a sun from anything.
+    pub hides_suns: bool,
     pub mesh: &'d DrawnMesh,
     pub world_from_object: DMat4,
     /// Corners of the box around it, world.
@@ -43,10 +44,10 @@ pub struct MapCaster<'d> {
 }
 
 /// A rectangle of all maps, and what is drawn there.
-struct View {
+pub(super) struct View {
     /// Left, top, width and height in texels.
-    area: [u32; 4],
-    clip_from_world: DMat4,
+    pub area: [u32; 4],
+    pub clip_from_world: DMat4,
 }
 
 /// The map of a sun.
@@ -55,7 +56,7 @@ fn sun_map(sun: &CrispSun, casters: &[MapCaster<'_>], left: u32) -> (View, SunMa
     let turned = (0..TURNS).map(|turn| {
         let turn = DVec2::from_angle(FRAC_PI_2 * f64::from(turn) / f64::from(TURNS));
         let axes = [turn.x * x + turn.y * y, turn.x * y - turn.y * x, sun.toward];
-        let corners = casters.iter().flat_map(|caster| caster.corners);
+        let corners = casters.iter().filter(|caster| caster.hides_suns).flat_map(|caster| caster.corners);
         let places = corners.map(|corner| DVec3::from(axes.map(|axis| axis.dot(corner))));
         let [low, high] =
             places.fold([DVec3::INFINITY, DVec3::NEG_INFINITY], |[low, high], place| [low.min(place), high.max(place)]);
@@ -115,7 +116,7 @@ pub struct SunMaps {
 }
 
 impl SunMaps {
-    /// Draws the maps of at most [`MOST_MAPS`] suns, and waits. There is something that casts shadows.
+    /// Draws the maps of at most [`crate::layout::MOST_SUN_MAPS`] suns, and waits. There is something that casts shadows.
     pub fn new(device: &Arc<Device>, library: &Library, suns: &[CrispSun], casters: &[MapCaster<'_>]) -> Result<Self> {
         let mut views = Vec::new();
         let mut maps = Vec::new();
@@ -131,12 +132,7 @@ impl SunMaps {
         let image = |name, format| Image::new(device, name, ImageShape { format, width, height, samples: 1 });
         let heights = image("sun maps", HEIGHT)?;
         let depth = image("sun map depth", DEPTH)?;
-        let state = GraphicsState { depth: Some(DEPTH), ..GraphicsState::plain(HEIGHT) };
-        let pipeline = |holes: bool| {
-            let [vertex, fragment] = Self::rows(holes);
-            GraphicsPipeline::new(device, "sun map", &library.shader(&vertex)?, &library.shader(&fragment)?, state)
-        };
-        let pipelines = [pipeline(false)?, pipeline(true)?];
+        let pipelines = pipelines(device, library)?;
         let mut commands = Commands::new(device, "sun maps")?;
         commands.image_barrier(&heights, None, Access::ColorWrite);
         commands.image_barrier(&depth, None, Access::DepthWrite);
@@ -146,7 +142,8 @@ impl SunMaps {
             commands.render(&target, |drawing| {
                 for view in &views {
                     drawing.area(view.area);
-                    casters.iter().try_for_each(|caster| draw(drawing, &pipelines, view, caster))?;
+                    let mut casters = casters.iter().filter(|caster| caster.hides_suns);
+                    casters.try_for_each(|caster| draw(drawing, &pipelines, view, caster))?;
                 }
                 Ok(())
             })
@@ -163,7 +160,17 @@ impl SunMaps {
     }
 }
 
-fn draw<'r>(
+/// What draws casters without holes, and with them.
+pub(super) fn pipelines(device: &Arc<Device>, library: &Library) -> Result<[GraphicsPipeline; 2]> {
+    let state = GraphicsState { depth: Some(DEPTH), ..GraphicsState::plain(HEIGHT) };
+    let pipeline = |holes: bool| {
+        let [vertex, fragment] = SunMaps::rows(holes);
+        GraphicsPipeline::new(device, "map of a light", &library.shader(&vertex)?, &library.shader(&fragment)?, state)
+    };
+    Ok([pipeline(false)?, pipeline(true)?])
+}
+
+pub(super) fn draw<'r>(
     drawing: &mut Drawing<'_, 'r>,
     [plain, with_holes]: &'r [GraphicsPipeline; 2],
     view: &View,

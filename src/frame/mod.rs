@@ -10,6 +10,7 @@
 mod change;
 mod draw_twin;
 mod gloss;
+mod light_maps;
 mod memory;
 mod mirror;
 mod options;
@@ -23,7 +24,6 @@ mod radiosity;
 mod record;
 mod seams;
 mod sky;
-mod sun_maps;
 mod twin;
 mod viewport;
 
@@ -33,6 +33,7 @@ use crate::bake::surfaces::{SurfacePlan, crisp_suns};
 use crate::bake::{self, Baker, SceneNeeds};
 use crate::bounce::{Bounce, BounceWork, Bounces, Linked, LinkedEntity};
 use crate::draw::Shading;
+use crate::draw::lamp_map::LampMaps;
 use crate::draw::sun_map::SunMaps;
 use crate::error::Result;
 use crate::gloss::Reflections;
@@ -47,6 +48,7 @@ use crate::scene_buffers::{SceneBuffers, limits};
 use crate::shaders::Library;
 use crate::sharp::{self, Sharp, SharpPermutation};
 use glam::Vec3;
+use light_maps::{StoodLamp, ToldSun};
 use permutation::{permutation, pixel_shading, usable};
 use picture::FramePicture;
 use pixel::PixelChains;
@@ -55,7 +57,6 @@ use radiosity::RadiosityBuffers;
 use sky::SkyLight;
 use std::ops::Range;
 use std::sync::Arc;
-use sun_maps::ToldSun;
 
 pub use memory::PictureMemory;
 #[cfg(feature = "cli")]
@@ -83,6 +84,10 @@ pub struct Frame {
     pub(crate) groups: Groups,
     /// The suns of which vertices tell whether they are hidden, in the order of their bits.
     told_suns: Vec<ToldSun>,
+    /// Lamps that have maps.
+    stood_lamps: Vec<StoodLamp>,
+    /// What stands in maps.
+    casters: Vec<usize>,
     /// What occludes and rested when that was baked, and where.
     stood: Vec<(usize, Placement)>,
     /// How far the rectangles that entities are reach into boxes; see [`seams::reaches`].
@@ -109,6 +114,8 @@ pub struct Frame {
     reflectors: mirror::Reflectors,
     /// Maps of suns, once a picture evaluates lights by them.
     sun_maps: Option<SunMaps>,
+    /// The same of lamps.
+    lamp_maps: Option<LampMaps>,
     picture: FramePicture,
 }
 
@@ -234,6 +241,8 @@ impl Frame {
                 .map(|(place, sun)| (scene.data.entities.len() + place, sun))
                 .map(|(entity, sun)| ToldSun { entity, stood: placements[entity], sun })
                 .collect(),
+            stood_lamps: light_maps::mapped_lamps(&scene, &methods),
+            casters: light_maps::casters(&scene),
             stood: (0..scene.data.entities.len())
                 .filter(|&entity| scene.entities[entity].occludes && scene.is_at_rest(entity))
                 .map(|entity| (entity, placements[entity]))
@@ -255,6 +264,7 @@ impl Frame {
             reflectors,
             chains: None,
             sun_maps: None,
+            lamp_maps: None,
             bounce,
             buffers,
         })

@@ -1,6 +1,6 @@
 //! Permutations of a scene's passes: the options, restricted to features of the scene and limits of the device.
 
-use super::{Options, sun_maps};
+use super::{Options, light_maps};
 use crate::field::silhouette::SilhouetteField;
 use crate::gpu::{Buffer, Device, TexelView};
 use crate::layout::{DeviceEntity, QUAD_FORMAT};
@@ -45,6 +45,7 @@ pub(super) fn sharp(
     let any_field = |wanted: fn(&SilhouetteField) -> bool| {
         buffers.meshes.iter().any(|mesh| mesh.slots.silhouette.as_ref().is_some_and(|slot| wanted(&slot.content)))
     };
+    let [sun_maps, lamp_maps] = light_maps::has_maps(scene, methods).map(|has| has && options.baked().groups);
     (!lights.is_empty()).then(|| SharpPermutation {
         reads: merge.variant.reads,
         entity_limit: merge.entity_limit,
@@ -57,7 +58,8 @@ pub(super) fn sharp(
         sheets: merge.sheets,
         cuboids: (0..scene.entities.len()).any(|entity| scene.casts_as_box(entity) || scene.casts_as_boxes(entity)),
         globes: (0..scene.entities.len()).any(|entity| scene.is_globe(entity)),
-        sun_maps: options.baked().groups && sun_maps::has_maps(scene),
+        sun_maps,
+        lamp_maps,
         gloss: merge.gloss,
         many_shown: merge.gloss && lights.len() > 4,
         self_shadows: buffers.has_self_shadows(),

@@ -184,6 +184,7 @@ impl Frame {
             shown: self.kept_for_gloss().map(|[_, lights, shares]| [lights, shares]),
             irradiances,
             sun_maps: self.sun_maps.as_ref().filter(|_| sharp.sun_maps),
+            lamp_maps: self.lamp_maps.as_ref().filter(|_| sharp.lamp_maps),
         })
     }
 

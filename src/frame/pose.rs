@@ -26,13 +26,13 @@ impl Frame {
         let bounds: Vec<EntityBounds> =
             bounds.chain(of_boxes().map(|(entity, number, p)| self.box_bounds(entity, number, p))).collect();
         let sun_bits = self.sun_bits(placements);
-        let sun_maps = self.sun_map_bits(placements);
+        let light_maps = self.light_map_bits(placements);
         let entities = of_entities().map(|(index, p)| {
             let sun_bits = sun_bits.get(&index).copied().unwrap_or(0);
-            layout::DeviceEntity { sun_bits, sun_maps: sun_maps[index], ..self.entity(index, p) }
+            layout::DeviceEntity { sun_bits, light_maps: light_maps[index], ..self.entity(index, p) }
         });
         let entities = entities.chain(of_boxes().map(|(entity, number, p)| layout::DeviceEntity {
-            sun_maps: sun_maps[entity],
+            light_maps: light_maps[entity],
             ..self.box_entity(entity, number, p)
         }));
         let white = f64::from(self.scene.data.output.white());

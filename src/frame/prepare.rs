@@ -64,7 +64,7 @@ impl Frame {
     /// recorded next, or every cluster is merged again.
     pub fn prepare(&mut self, placements: &[Placement], viewports: &[Viewport], relights: bool) -> Result<()> {
         self.picture.mirrors = self.mirrors_of(placements, viewports);
-        self.fit_sun_maps()?;
+        self.fit_maps()?;
         if relights {
             self.fit_edges()?;
             self.prepare_merge(placements)?;

@@ -268,13 +268,20 @@ impl<'r> Commands<'r> {
 
     /// Copies a whole single-sampled image into a buffer; rows are tightly packed.
     pub fn copy_image(&mut self, from: &'r Image, to: &'r Buffer) {
+        self.copy_rows(from, from.shape.height, to, to.all());
+    }
+
+    /// Copies the first rows of a single-sampled image, tightly packed, to a range of a buffer of their size.
+    pub fn copy_rows(&mut self, from: &'r Image, rows: u32, to: &'r Buffer, range: Range<u64>) {
         let pass = self.pass_name();
+        let mut region = packed(from).buffer_offset(range.start);
+        region.image_extent.height = rows;
         self.tracker.use_image(from.id, &from.name, Access::TransferRead, &pass);
-        self.copied_into(to, to.all(), &pass);
+        self.copied_into(to, range, &pass);
         let layout = Access::TransferRead.layout();
         let (handle, buffer) = self.raw();
         // SAFETY: both are borrowed until the commands have run; the layout is that of a transfer read (tracked).
-        unsafe { handle.cmd_copy_image_to_buffer(buffer, from.raw(), layout, to.raw(), &[packed(from)]) };
+        unsafe { handle.cmd_copy_image_to_buffer(buffer, from.raw(), layout, to.raw(), &[region]) };
     }
 
     /// Copies a buffer into the whole of a single-sampled image; rows are tightly packed.

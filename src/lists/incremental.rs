@@ -390,7 +390,7 @@ impl ClusterLists {
                 let has_edge = |&entry: &u32| {
                     let [entity, _] = ListEntry::entities(entry);
                     let light = &now.entities[entity as usize];
-                    !ListEntry::is_light(entry) || light.is_spot() || light.sun_maps != 0 || scope.may_be_at(light)
+                    !ListEntry::is_light(entry) || light.is_spot() || light.light_maps != 0 || scope.may_be_at(light)
                 };
                 if entries.iter().any(has_edge) { entries } else { Vec::new() }
             };
@@ -476,7 +476,7 @@ fn without_mapped(entries: &[u32], entities: &[DeviceEntity]) -> Vec<u32> {
         if ListEntry::is_light(entry) {
             kept.push(entry & !ENTRY_ENTITIES | occluders);
             occluders = 0;
-        } else if entities[entity as usize].sun_maps & entities[light as usize].sun_maps == 0 {
+        } else if entities[entity as usize].light_maps & entities[light as usize].light_maps == 0 {
             kept.push(entry);
             occluders += 1;
         }

@@ -19,7 +19,7 @@ use crate::field::sub_light::{
     BLEND, CORNER, LIMIT_OUTLINE, LIMIT_SINE, MOST_SINE, NEAR_LIGHT_STEPS, STRIP, THIN, TURNED_BY,
 };
 use crate::gpu::{Bind, Buffer, Commands, ComputePipeline, Device, TexelView};
-use crate::layout::{CLUSTER_FORMAT, CLUSTER_VERTICES, ENTRY_BITS, ENTRY_FORMAT, SHOWN_LIGHTS};
+use crate::layout::{CLUSTER_FORMAT, CLUSTER_VERTICES, ENTRY_BITS, ENTRY_FORMAT, MOST_SUN_MAPS, SHOWN_LIGHTS};
 use crate::merge::variant::Reads;
 use crate::shaders::{Library, ShaderPermutation};
 use ash::vk;
@@ -60,6 +60,15 @@ const BALL_WIDER: f64 = 1.15;
 /// Lookups in the map of a sun that find what hides it, and those that find how much of it is hidden.
 const SEEKING_TAPS: u32 = 16;
 const BLURRING_TAPS: u32 = 24;
+/// Places on a lamp to which rays go, or on each of its four parts, and steps of each ray through a map.
+const LAMP_TAPS: u32 = 16;
+const PART_TAPS: u32 = 4;
+const LAMP_STEPS: u32 = 6;
+/// Halvings of the step in which a ray comes out from behind something. With two the edges of a lampshade's light are off
+/// by 0.0185 of all light, with one by 0.028.
+const HALVINGS: u32 = 3;
+/// Share of its gap that something must still leave where a ray that passes behind it meets it.
+const STILL_THERE: f64 = 0.8;
 /// How far above a surface something must stand that casts a shadow on it, in texels of the map: above a flat one, and
 /// above one that stands for something round, whose vertices have other normals.
 const FLAT_BIAS: f64 = 0.1;
@@ -102,6 +111,8 @@ pub struct SharpPermutation {
     pub globes: bool,
     /// Whether suns have maps of what rests.
     pub sun_maps: bool,
+    /// Whether other lights have.
+    pub lamp_maps: bool,
     /// Whether any lit mesh can shadow itself.
     pub self_shadows: bool,
     /// Whether the shares of lights whose highlights are shown are kept.
@@ -136,7 +147,8 @@ impl SharpPermutation {
 
     /// A fragment shader that shows highlights of sharp lights, whose shadows it is given.
     pub fn highlight_row(&self, row: ShaderPermutation) -> ShaderPermutation {
-        SharpPermutation { self_shadows: false, edges: false, gloss: false, sun_maps: false, ..*self }.on_pixels(row)
+        SharpPermutation { self_shadows: false, edges: false, gloss: false, sun_maps: false, lamp_maps: false, ..*self }
+            .on_pixels(row)
     }
 
     fn on_pixels(self, row: ShaderPermutation) -> ShaderPermutation {
@@ -162,6 +174,12 @@ impl SharpPermutation {
             .define("CUBOIDS", self.cuboids)
             .define("GLOBES", self.globes)
             .define("SUN_MAPS", self.sun_maps)
+            .define("LAMP_MAPS", self.lamp_maps)
+            .define("LAMP_BIT", 1_u32 << MOST_SUN_MAPS)
+            .define("LAMP_STEPS", LAMP_STEPS)
+            .define("LAMP_TAPS", LAMP_TAPS)
+            .define("PART_TAPS", PART_TAPS)
+            .define("HALVINGS", HALVINGS)
             .define("SEEKING_TAPS", SEEKING_TAPS)
             .define("BLURRING_TAPS", BLURRING_TAPS)
             .define("SELF", self.self_shadows)
@@ -196,6 +214,7 @@ impl SharpPermutation {
             ("DARKENED", DARKENED),
             ("TOUCHING_TEXELS", TOUCHING_TEXELS),
             ("LEAST_FACING", LEAST_FACING),
+            ("STILL_THERE", STILL_THERE),
             ("NEAR_LIGHT", (NEAR_LIGHT_STEPS / EDGE_STEPS).powi(2)),
             ("MOST_SINE", MOST_SINE),
             ("LIMIT_SINE", LIMIT_SINE),

@@ -40,11 +40,18 @@ pub(super) fn has_maps(scene: &Scene, methods: &[LightMethod]) -> [bool; 2] {
 /// The lamps that have maps, in the order of their bits: those that rest among many things, or in a fitting that nothing
 /// convex joins: a cord through its top would be lit past that.
 pub(super) fn mapped_lamps(scene: &Scene, methods: &[LightMethod]) -> Vec<StoodLamp> {
+    let has_shape = |entity: usize| matches!(methods[entity], LightMethod::Ball(_) | LightMethod::LampFace(_));
+    let mut lamps: Vec<usize> = (0..scene.data.entities.len())
+        .filter(|&entity| scene.entities[entity].emits && has_shape(entity) && scene.is_at_rest(entity))
+        .collect();
+    if lamps.is_empty() {
+        return Vec::new();
+    }
     let placements = scene.at(0.0);
     let casters = casters(scene);
     let sphere = |entity: usize| placements[entity].sphere(scene.meshes[scene.entities[entity].mesh].bounding_sphere());
-    let has_shape = |entity: usize| matches!(methods[entity], LightMethod::Ball(_) | LightMethod::LampFace(_));
-    let bounds = |entity: usize| scene.meshes[scene.entities[entity].mesh].extent().map(Vec3::as_dvec3);
+    let extents: Vec<[DVec3; 2]> = scene.meshes.iter().map(|mesh| mesh.extent().map(Vec3::as_dvec3)).collect();
+    let bounds = |entity: usize| extents[scene.entities[entity].mesh];
     // The place nearest to another in the box around an entity, world.
     let nearest_in = |entity: usize, place: DVec3| {
         let [low, high] = bounds(entity);
@@ -71,12 +78,9 @@ pub(super) fn mapped_lamps(scene: &Scene, methods: &[LightMethod]) -> Vec<StoodL
         };
         casters.iter().any(is_around) && apart(lamp).is_empty()
     };
-    (0..scene.data.entities.len())
-        .filter(|&entity| scene.entities[entity].emits && has_shape(entity) && scene.is_at_rest(entity))
-        .filter(|&entity| casters.len() >= MANY_CASTERS || is_fitted(entity))
-        .take(MOST_LAMP_MAPS)
-        .map(|entity| StoodLamp { entity, stood: placements[entity], apart: apart(entity) })
-        .collect()
+    lamps.retain(|&lamp| casters.len() >= MANY_CASTERS || is_fitted(lamp));
+    lamps.truncate(MOST_LAMP_MAPS);
+    lamps.into_iter().map(|entity| StoodLamp { entity, stood: placements[entity], apart: apart(entity) }).collect()
 }
 
 /// A lamp that has a map.
@@ -103,19 +107,28 @@ impl Frame {
         let Some(sharp) = self.sharp.as_ref().map(|sharp| sharp.permutation).filter(|_| self.wants_edges()) else {
             return Ok(());
         };
-        if sharp.sun_maps && self.sun_maps.is_none() {
+        if !sharp.sun_maps && !sharp.lamp_maps || self.sun_maps.is_some() || self.lamp_maps.is_some() {
+            return Ok(());
+        }
+        let casters = self.map_casters();
+        let suns = || {
             let suns: Vec<CrispSun> = self.told_suns.iter().map(|told| told.sun).take(MOST_SUN_MAPS).collect();
-            let maps = SunMaps::new(&self.device, &self.library, &suns, &self.map_casters())?;
+            let maps = SunMaps::new(&self.device, &self.library, &suns, &casters)?;
             let [width, height] = [maps.heights.shape.width, maps.heights.shape.height];
             log::debug!("maps of {} suns: {width} x {height} texels", suns.len());
-            self.sun_maps = Some(maps);
-        }
-        if sharp.lamp_maps && self.lamp_maps.is_none() {
+            Ok(maps)
+        };
+        let lamps = || {
             let lamps: Vec<MappedLamp> = self.stood_lamps.iter().map(|lamp| self.mapped_lamp(lamp)).collect();
-            let maps = LampMaps::new(&self.device, &self.library, &lamps, &self.map_casters())?;
+            let maps = LampMaps::new(&self.device, &self.library, &lamps, &casters)?;
             log::debug!("maps of {} lamps: {} bytes", lamps.len(), maps.texels.size_bytes);
-            self.lamp_maps = Some(maps);
-        }
+            Ok(maps)
+        };
+        let sun_maps = sharp.sun_maps.then(suns).transpose()?;
+        let lamp_maps = sharp.lamp_maps.then(lamps).transpose()?;
+        drop(casters);
+        self.sun_maps = sun_maps;
+        self.lamp_maps = lamp_maps;
         Ok(())
     }
 

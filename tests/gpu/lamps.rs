@@ -336,8 +336,8 @@ sun = { toward = [0.5, 0.8, 0.3], angle_deg = 1, radiance = [3000, 3000, 3000] }
 fn a_lampshade_has_a_soft_edge() {
     let Some(gpu) = gpu() else { return };
     let place = |i: u32, radius: f32, y: f32| {
-        let (sin, cos) = (TAU * i as f32 / 32.0).sin_cos();
-        Vec3::new(radius * cos, y, radius * sin)
+        let around = radius * Vec2::from_angle(TAU * i as f32 / 32.0);
+        Vec3::new(around.x, y, around.y)
     };
     let shade = (0..32)
         .flat_map(|i| [place(i, 0.1, 0.15), place(i + 1, 0.1, 0.15), place(i + 1, 0.25, -0.15), place(i, 0.25, -0.15)]);

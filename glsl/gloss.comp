@@ -22,7 +22,7 @@ READ_VEC4(8, Radiosity, radiosity, radiosity_at)
 layout(std430, binding = 9) writeonly buffer Reflected { vec4 reflected[]; }; // two a vertex
 #if LINKS
 #include "links.glsl"
-READ_UVEC2(10, Ranges, ranges, range_at) // first link, and how many in the low byte
+READ_UVEC2(10, Ranges, ranges, range_at) // first link, and how many
 READ_UINT(11, Links, links, link_at)
 READ_VEC4(12, RunLight, run_light, run_light_at)
 READ_VEC4(13, RunPlaces, run_places, run_place_at) // two a run, of which the first is its middle, and whether it rests
@@ -108,7 +108,7 @@ Linked linked_light(View view, vec3 place, uint v) {
     uvec2 range = range_at(v);
     vec3 sum = vec3(0.0), weighed = vec3(0.0);
     float whole = 0.0;
-    for (uint k = range.x; k < range.x + (range.y & 255); k++) {
+    for (uint k = range.x; k < range.x + link_count(range); k++) {
         uint packed = link_at(k);
         uint run = link_number(packed);
         vec3 light = run_light_at(run).rgb;

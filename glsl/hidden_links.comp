@@ -1,6 +1,7 @@
 #version 460
 #extension GL_EXT_control_flow_attributes : require
-// The links between what rests, less what boxes that move hide of them: src/bounce/boxes.rs. A cluster a workgroup.
+// The links between what rests, less what boxes that move hide of them: src/bounce/boxes.rs. A vertex a thread and a
+// cluster a workgroup, or with OF_RUNS a run a thread, whose links start at its middle.
 #include "merge_layout.glsl"
 layout(local_size_x = WORKGROUP) in;
 
@@ -14,15 +15,23 @@ layout(local_size_x = WORKGROUP) in;
 READ_VEC4(2, Vertices, vertices, vertex_quad)
 READ_UVEC2(3, Ranges, ranges, range_at) // first link; how many, and above them the entity
 READ_UINT(4, Links, links, link_at)
-READ_VEC4(5, Places, places, place_at) // two a run: its middle, world, and whether it rests; the second is not read here
+READ_VEC4(5, Places, places, place_at) // two a run: its middle, world, and whether it rests; its mean normal
 READ_VEC4(6, Edges, edges, edge_at) // three an entity: halves of a box's edges, its frame, in r
 READ_UINT(7, Directions, directions, direction_at) // of their rays
 layout(std430, binding = 8) buffer Hidden { uint hidden[]; };
-layout(push_constant) uniform Push { uint count, boxes[MOST_BOXES]; } push; // entities
+layout(push_constant) uniform Push { uint count, boxes[MOST_BOXES], run_count; } push; // boxes are entities
 #include "outline.glsl"
 #include "cuboid.glsl"
 
 void main() {
+#if OF_RUNS
+    uint receiver = gl_GlobalInvocationID.x;
+    if (receiver >= push.run_count) {
+        return;
+    }
+    vec3 place = place_at(2 * receiver).xyz, normal = place_at(2 * receiver + 1).xyz;
+    uvec2 range = range_at(receiver);
+#else
     Cluster cluster = cluster_at(gl_WorkGroupID.x);
     uint v = gl_LocalInvocationID.x;
     if (v >= cluster.vertex_count) {
@@ -33,7 +42,8 @@ void main() {
     vec3 place = receiver.centre.xyz + receiver.scale * to_world(receiver, vertex_quad(at).xyz);
     vec3 normal = to_world(receiver, vertex_quad(at + 1).xyz);
     uvec2 range = range_at(cluster.radiosity_first + v);
-    uint first = range.x, end = first + (range.y & 255);
+#endif
+    uint first = range.x, end = first + link_count(range);
     for (uint k = first; k < end; k++) {
         hidden[k] = link_at(k);
     }

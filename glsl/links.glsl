@@ -12,6 +12,15 @@ uint packed_link(float share, uint number) {
     return max(bits, LEAST_SHARE_BITS) - LEAST_SHARE_BITS << RUN_BITS | number;
 }
 
+// Of a range of links: how many there are, and the entity whose they are.
+uint link_count(uvec2 range) {
+    return range.y & ((1u << COUNT_BITS) - 1);
+}
+
+uint linked_entity(uvec2 range) {
+    return range.y >> COUNT_BITS;
+}
+
 // Not quite of unit length.
 vec3 unpacked_direction(uint packed) {
     return vec3(packed & 1023u, packed >> 10 & 1023u, packed >> 20) / 511.5 - 1.0;

@@ -11,7 +11,7 @@ use shadow_fields::bake::raster::Raster;
 use shadow_fields::bake::silhouette::SilhouetteOptions;
 use shadow_fields::bounce::boxes::hidden_row;
 use shadow_fields::bounce::movers::{distant_row, movers_row, outgoing_row};
-use shadow_fields::bounce::{bounce_row, runs_row};
+use shadow_fields::bounce::{bounce_row, means_row, relax_row};
 use shadow_fields::draw::grid::DrawGrid;
 use shadow_fields::draw::mirror::Mirrored;
 use shadow_fields::draw::pixel_light::{LightImages, Receiver, Step};
@@ -42,8 +42,10 @@ fn baking() -> Vec<ShaderPermutation> {
 fn bouncing() -> Vec<ShaderPermutation> {
     let rows = |texels| {
         [
-            runs_row(texels, false),
-            runs_row(texels, true),
+            means_row(texels, false),
+            means_row(texels, true),
+            relax_row(texels, false),
+            relax_row(texels, true),
             bounce_row(texels, false, true),
             bounce_row(texels, true, false),
             bounce_row(texels, true, true),
@@ -57,7 +59,8 @@ fn bouncing() -> Vec<ShaderPermutation> {
         [
             outgoing_row(&merge),
             distant_row(&merge),
-            hidden_row(&merge),
+            hidden_row(&merge, false),
+            hidden_row(&merge, true),
             movers_row(&merge, false),
             movers_row(&merge, true),
         ]

@@ -23,6 +23,8 @@ const LEAST_SHARE: f32 = 1.0 / 64.0;
 const MOST_LINKS: usize = 192;
 /// Bits of the number of a run, below those of its share.
 pub const RUN_BITS: u32 = 20;
+/// Bits of how many links a vertex or a run has, below the number of its entity.
+pub const COUNT_BITS: u32 = 12;
 /// The upper half of the smallest share that is kept, 2^-31, as f32.
 const LEAST_SHARE_BITS: u32 = (127 - 31) << 7;
 
@@ -39,6 +41,11 @@ pub fn unpack(packed: u32) -> (usize, f32) {
     ((packed & ((1 << RUN_BITS) - 1)) as usize, share)
 }
 
+/// How many links there are, of a number that has the entity's above it.
+pub fn count(packed: u32) -> usize {
+    (packed & ((1 << COUNT_BITS) - 1)) as usize
+}
+
 /// A direction, ten bits an axis.
 pub fn pack_direction(toward: Vec3) -> u32 {
     let [x, y, z] = toward.normalize_or_zero().to_array().map(|c| ((c + 1.0) * 511.5).round() as u32);
@@ -53,7 +60,7 @@ pub fn unpack_direction(packed: u32) -> Vec3 {
 
 /// The macros of shaders that read links.
 pub fn macros(row: ShaderPermutation) -> ShaderPermutation {
-    row.define("RUN_BITS", RUN_BITS).define("LEAST_SHARE_BITS", LEAST_SHARE_BITS)
+    row.define("RUN_BITS", RUN_BITS).define("LEAST_SHARE_BITS", LEAST_SHARE_BITS).define("COUNT_BITS", COUNT_BITS)
 }
 
 /// Numbers of the runs of a group's members.

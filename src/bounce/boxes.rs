@@ -6,7 +6,7 @@
 //! the mean direction of its rays and as far away as its run. Such links serve the frame, and the boxes dim no others;
 //! the light that they reflect themselves comes as that of all movers.
 
-use super::LinkedLight;
+use super::{LinkBuffers, LinkList};
 use crate::bake::links;
 use crate::error::Result;
 use crate::gpu::{Bind, Buffer, Commands, ComputePipeline, Device, Upload};
@@ -26,13 +26,18 @@ pub(super) const LEAST_COSINE: f64 = 0.1;
 pub(super) const NARROWED: f64 = 0.5;
 
 pub(super) struct Boxes {
-    pipeline: ComputePipeline,
     texels: bool,
     pub push: BoxPush,
-    /// Of all links, the mean directions of their rays.
+    of_vertices: HiddenLinks,
+    of_runs: HiddenLinks,
+}
+
+pub(super) struct HiddenLinks {
+    pipeline: ComputePipeline,
+    /// Mean directions of their rays.
     pub directions: Buffer,
-    /// All links, as the last frame has left them.
-    pub links: Buffer,
+    /// As the last frame has left them.
+    links: Buffer,
 }
 
 /// What the pass is pushed.
@@ -42,6 +47,8 @@ pub(super) struct BoxPush {
     count: u32,
     /// Numbers of entities.
     entities: [u32; MOST_SCREENS],
+    /// Runs of the scene.
+    run_count: u32,
 }
 
 impl BoxPush {
@@ -56,50 +63,73 @@ impl Boxes {
         device: &Arc<Device>,
         library: &Library,
         boxes: &[usize],
-        [links, directions]: [&[u32]; 2],
+        [of_vertices, of_runs]: [&LinkList; 2],
         permutation: &MergePermutation,
     ) -> Result<Option<Self>> {
         if boxes.is_empty() {
             return Ok(None);
         }
+        let run_count = of_runs.ranges.len() as u32;
         let mut entities = [0; MOST_SCREENS];
         entities.iter_mut().zip(boxes).for_each(|(to, entity)| *to = *entity as u32);
+        let hidden = |list: &LinkList, runs| -> Result<HiddenLinks> {
+            let shader = library.shader(&hidden_row(permutation, runs))?;
+            Ok(HiddenLinks {
+                pipeline: ComputePipeline::new(device, "hidden links", &shader)?,
+                directions: Buffer::with_data(device, "directions of links", &list.directions)?,
+                // Links of what receives no light stay so.
+                links: Buffer::with_data(device, "links past boxes", &list.links)?,
+            })
+        };
         Ok(Some(Boxes {
-            pipeline: ComputePipeline::new(device, "hidden links", &library.shader(&hidden_row(permutation))?)?,
             texels: permutation.reads_texels(),
-            push: BoxPush { count: boxes.len() as u32, entities },
-            directions: Buffer::with_data(device, "directions of links", directions)?,
-            // Links of what receives no light stay so.
-            links: Buffer::with_data(device, "links past boxes", links)?,
+            push: BoxPush { count: boxes.len() as u32, entities, run_count },
+            of_vertices: hidden(of_vertices, false)?,
+            of_runs: hidden(of_runs, true)?,
         }))
     }
 
-    /// Writes the links of so many clusters.
+    /// Those of vertices, then of runs.
+    pub fn hidden(&self) -> [&HiddenLinks; 2] {
+        [&self.of_vertices, &self.of_runs]
+    }
+
+    pub fn links(&self) -> [&Buffer; 2] {
+        self.hidden().map(|hidden| &hidden.links)
+    }
+
+    /// Writes the links of the vertices of so many clusters, and of all runs, from those that are `baked`.
     pub fn record<'r>(
         &'r self,
         commands: &mut Commands<'r>,
         inputs: &MergeInputs<'r>,
         (clusters, cluster_count): (&'r Upload, u32),
-        baked: &LinkedLight<'r>,
-        edges: &'r Buffer,
+        baked: [&'r LinkBuffers; 2],
+        [run_places, edges]: [&'r Buffer; 2],
     ) -> Result<()> {
-        let resources = [
-            inputs.entities.clone(),
-            Bind::read(self.texels, clusters, vk::Format::R32G32_UINT)?,
-            inputs.vertices.clone(),
-            Bind::read(self.texels, baked.ranges, vk::Format::R32G32_UINT)?,
-            Bind::read(self.texels, baked.links, vk::Format::R32_UINT)?,
-            Bind::read(self.texels, baked.run_places, QUAD_FORMAT)?,
-            Bind::read(self.texels, edges, QUAD_FORMAT)?,
-            Bind::read(self.texels, &self.directions, vk::Format::R32_UINT)?,
-            Bind::Buffer(&self.links),
-        ];
-        commands.dispatch(&self.pipeline, &resources, &self.push, [cluster_count * CLUSTER_VERTICES, 1, 1])
+        let threads = [cluster_count * CLUSTER_VERTICES, self.push.run_count];
+        for ((hidden, baked), threads) in self.hidden().into_iter().zip(baked).zip(threads) {
+            let resources = [
+                inputs.entities.clone(),
+                Bind::read(self.texels, clusters, vk::Format::R32G32_UINT)?,
+                inputs.vertices.clone(),
+                Bind::read(self.texels, &baked.ranges, vk::Format::R32G32_UINT)?,
+                Bind::read(self.texels, &baked.links, vk::Format::R32_UINT)?,
+                Bind::read(self.texels, run_places, QUAD_FORMAT)?,
+                Bind::read(self.texels, edges, QUAD_FORMAT)?,
+                Bind::read(self.texels, &hidden.directions, vk::Format::R32_UINT)?,
+                Bind::Buffer(&hidden.links),
+            ];
+            commands.dispatch(&hidden.pipeline, &resources, &self.push, [threads, 1, 1])?;
+        }
+        Ok(())
     }
 }
 
-pub fn hidden_row(permutation: &MergePermutation) -> ShaderPermutation {
+/// The links of vertices, or of runs.
+pub fn hidden_row(permutation: &MergePermutation, runs: bool) -> ShaderPermutation {
     links::macros(permutation.row_of("hidden_links.comp"))
+        .define("OF_RUNS", runs)
         .number("LEAST_COSINE", LEAST_COSINE)
         .number("NARROWED", NARROWED)
         .define("MOST_BOXES", MOST_SCREENS as u32)

@@ -1,11 +1,12 @@
 //! Passes "runs" and "bounce": light that surfaces of a rigid group pass on to each other.
 //!
 //! A vertex has links to runs of neighbouring vertices that it sees ([`crate::bake::links`]); a run has the mean light
-//! that leaves its vertices. The two passes alternate, once a bounce: means of all runs, and for every vertex its direct
-//! light and albedo times the light along its links. That is Jacobi's iteration of the radiosity equation: each step adds
-//! a bounce. Each goes further than the light has changed, by a factor of its own, so that few bring all (`relaxation`).
+//! that leaves its vertices, and all of their links, each by the mean of its shares. So runs alone pass light on to each
+//! other, step by step, and the last bounce goes along the links of vertices. That is Jacobi's iteration of the radiosity
+//! equation: each step adds a bounce, and goes further than the light has changed, by a factor of its own, so that few
+//! bring all (`relaxation`).
 //!
-//! Between groups light goes by [`movers`], in the last steps, as it needs the light that those before bring. Only fronts
+//! Between groups light goes by [`movers`], in later steps, as it needs the light that those before bring. Only fronts
 //! reflect. A lamp in spherical harmonics inside a closed mesh lights nothing of it, as the mesh's transfer ends where its
 //! own far side blocks; a sharp one does.
 
@@ -15,8 +16,8 @@ mod relaxation;
 pub(crate) mod twin;
 
 use crate::asset::Mesh;
-use crate::bake::cluster_order::RunEnds;
-use crate::bake::links::{self, RUN_BITS, RUNS, Runs};
+use crate::bake::cluster_order::{RunEnds, runs};
+use crate::bake::links::{self, COUNT_BITS, RUN_BITS, RUNS, Runs, pack, pack_direction, unpack, unpack_direction};
 use crate::bake::surfaces::Links;
 use crate::error::Result;
 use crate::field::cuboid::Cuboid;
@@ -33,7 +34,8 @@ use ash::vk;
 use bytemuck::Zeroable;
 use glam::{DVec3, Vec3};
 use movers::{Movers, Surfaces};
-use relaxation::Relaxation;
+use rayon::prelude::*;
+use std::ops::Range;
 use std::sync::Arc;
 
 /// How often light bounces.
@@ -62,13 +64,30 @@ impl Bounces {
     }
 }
 
-/// Neighbouring vertices that are lit alike where it is found how many steps are needed.
-const SPOT: u32 = 256;
-/// Error of light that goes between groups, where all vertices have a direct light of 1.
-const LEAVING_ERROR: f64 = 0.04;
+/// Neighbouring runs that are lit alike where it is found how many steps are needed.
+const SPOT: usize = 32;
 
 /// Entries that views have to hold for the lists of what moves: more than all clusters of a large scene have.
 const MOST_ENTRIES: u64 = 1 << 24;
+
+/// Links of vertices or of runs.
+#[derive(Default)]
+struct LinkList {
+    /// For each its first link, and the number of its links below its entity.
+    ranges: Vec<[u32; 2]>,
+    /// Numbers of runs below their shares.
+    links: Vec<u32>,
+    /// Mean directions of their rays, where boxes hide any.
+    directions: Vec<u32>,
+}
+
+impl LinkList {
+    /// No buffer is empty.
+    fn fill(&mut self) {
+        self.links.resize(self.links.len().max(1), 0);
+        self.directions.resize(self.directions.len().max(1), 0);
+    }
+}
 
 /// Links of all vertices of a scene, by the places of entities' vertices in the buffers of light.
 #[derive(Default)]
@@ -77,12 +96,9 @@ pub struct Linked {
     blocks: Vec<RunBlock>,
     /// A third of the triangles around each vertex.
     areas: Vec<f32>,
-    /// For each vertex its first link, and the number of its links below its entity.
-    ranges: Vec<[u32; 2]>,
-    /// Numbers of runs below their shares.
-    links: Vec<u32>,
-    /// Mean directions of their rays, where boxes hide any.
-    directions: Vec<u32>,
+    of_vertices: LinkList,
+    /// Those of the smallest runs, by number.
+    of_runs: LinkList,
     /// All runs, of which those that rest are seen by what moves.
     far: FarRuns,
     surfaces: Surfaces,
@@ -98,7 +114,7 @@ impl Linked {
         let vertices = entities.iter().map(|entity| entity.order.len()).sum();
         let mut linked = Linked {
             areas: vec![0.0; vertices],
-            ranges: vec![[0, 0]; vertices],
+            of_vertices: LinkList { ranges: vec![[0, 0]; vertices], ..LinkList::default() },
             surfaces: Surfaces::new(entities),
             far: FarRuns { volume, ..FarRuns::default() },
             receives: entities.iter().any(|entity| !entity.rests && entity.receives),
@@ -138,20 +154,20 @@ impl Linked {
             log::warn!("light does not bounce: {} runs of vertices are more than links number", linked.run_count);
             return None;
         }
-        if linked.links.is_empty() && !linked.meets() {
+        if linked.of_vertices.links.is_empty() && !linked.meets() {
             return None;
         }
-        // No buffer is empty.
-        linked.links.resize(linked.links.len().max(1), 0);
-        linked.directions.resize(linked.directions.len().max(1), 0);
+        linked.of_runs = linked.links_of_runs();
+        linked.of_vertices.fill();
+        linked.of_runs.fill();
         Some(linked)
     }
 
     /// Whether texel views of a device hold what is read of it.
     pub fn fits_texels(&self, device: &Device) -> bool {
-        let quads = self.ranges.len().max(2 * self.run_count) as u64;
-        TexelView::fits(device, vk::Format::R32_UINT, 4 * self.links.len() as u64)
-            && TexelView::fits(device, QUAD_FORMAT, 16 * quads)
+        let quads = self.of_vertices.ranges.len().max(2 * self.run_count) as u64;
+        let links = self.of_vertices.links.len().max(self.of_runs.links.len()) as u64;
+        TexelView::fits(device, vk::Format::R32_UINT, 4 * links) && TexelView::fits(device, QUAD_FORMAT, 16 * quads)
     }
 
     /// Whether light bounces between groups.
@@ -195,56 +211,78 @@ impl Linked {
         for (place, &v) in (entity.first..).zip(entity.order) {
             self.areas[place] = areas[v as usize] as f32;
         }
-        let ranges = &mut self.ranges[entity.first..][..entity.order.len()];
-        ranges.fill([0, (index as u32) << 8]);
+        let list = &mut self.of_vertices;
+        let ranges = &mut list.ranges[entity.first..][..entity.order.len()];
+        ranges.fill([0, (index as u32) << COUNT_BITS]);
         let Some(links) = &entity.links else { return };
-        let mut from = self.links.len() as u32;
+        let mut from = list.links.len() as u32;
         for (range, &count) in ranges.iter_mut().zip(&links.counts) {
             *range = [from, u32::from(count) | range[1]];
             from += u32::from(count);
         }
-        self.links.extend(links.packed.iter().map(|link| link + base));
+        list.links.extend(links.packed.iter().map(|link| link + base));
         if self.surfaces.hide_links() {
-            self.directions.extend(&links.directions);
+            list.directions.extend(&links.directions);
             // What moves itself hides nothing of its own.
-            self.directions.resize(self.links.len(), 0);
+            list.directions.resize(list.links.len(), 0);
         }
+    }
+
+    /// The links of every smallest run: those of its vertices by their areas, one for each run that they lead to.
+    fn links_of_runs(&self) -> LinkList {
+        let of_block = |block: &RunBlock| {
+            let of_run = |(run, places): (usize, Range<usize>)| (run, places.start, self.joined_links(places));
+            block.smallest_runs().map(of_run).collect::<Vec<_>>()
+        };
+        let found: Vec<_> = self.blocks.par_iter().flat_map_iter(of_block).collect();
+        let mut list = LinkList { ranges: vec![[0, 0]; self.run_count], ..LinkList::default() };
+        for (run, place, joined) in found {
+            let entity = self.of_vertices.ranges[place][1] >> COUNT_BITS;
+            list.ranges[run] = [list.links.len() as u32, joined.len() as u32 | entity << COUNT_BITS];
+            list.links.extend(joined.iter().map(|(link, _)| link));
+            if self.surfaces.hide_links() {
+                list.directions.extend(joined.iter().map(|(_, toward)| pack_direction(*toward)));
+            }
+        }
+        list
+    }
+
+    /// Links of some vertices as one, each with its direction where that is known.
+    fn joined_links(&self, places: Range<usize>) -> Vec<(u32, Vec3)> {
+        let LinkList { ranges, links, directions } = &self.of_vertices;
+        let whole_m2: f32 = self.areas[places.clone()].iter().sum();
+        let mut found: Vec<(usize, f32, Vec3)> = Vec::new();
+        for place in places {
+            let weight = self.areas[place] / whole_m2.max(1e-30);
+            let [first, packed] = ranges[place];
+            for link in (first as usize..).take(links::count(packed)) {
+                let (run, share) = unpack(links[link]);
+                let toward = directions.get(link).map_or(Vec3::ZERO, |packed| unpack_direction(*packed));
+                found.push((run, weight * share, weight * share * toward));
+            }
+        }
+        found.sort_by_key(|(run, ..)| *run);
+        let joined = |same: &[(usize, f32, Vec3)]| {
+            let share = same.iter().map(|(_, share, _)| share).sum();
+            let toward = same.iter().map(|(.., toward)| *toward).sum();
+            pack(share, same[0].0 as u32).map(|link| (link, toward))
+        };
+        found.chunk_by(|a, b| a.0 == b.0).filter_map(joined).collect()
     }
 }
 
 impl Steps {
-    /// One or no bounce.
-    fn exactly(count: u32, meets: bool) -> Self {
-        Steps { gains: vec![[0.0; 3]; count as usize], alone: if meets { 0 } else { count } }
-    }
-
-    /// All bounces within groups.
-    fn within(all: &Relaxation) -> Self {
-        let gains = all.gains(all.steps).into_iter();
-        Steps { gains: gains.map(|gain| gain.as_vec3().to_array()).collect(), alone: all.steps as u32 }
-    }
-
-    /// All bounces: first within groups, then between them too, at least two and `count` in all. The last adds nothing,
-    /// so that light which a surface has from other groups alone stays as it is.
-    fn between(alone: &Relaxation, count: usize) -> Self {
-        let met = count.saturating_sub(alone.steps + 1).max(1);
-        let gains = alone.gains(alone.steps).into_iter().chain(alone.gains(met)).chain([DVec3::ZERO]);
-        Steps { gains: gains.map(|gain| gain.as_vec3().to_array()).collect(), alone: alone.steps as u32 }
-    }
-
-    pub(crate) fn count(&self) -> u32 {
-        self.gains.len() as u32
+    /// What pass "runs" is pushed for each of its steps.
+    fn pushes(&self) -> impl Iterator<Item = RelaxPush> {
+        let meets = |step| u32::from(step >= self.alone);
+        self.gains.iter().enumerate().map(move |(step, &gain)| RelaxPush { gain, meets: meets(step) })
     }
 }
 
-/// What pass "bounce" is pushed.
 #[repr(C)]
 #[derive(Clone, Copy, bytemuck::Pod, Zeroable)]
-struct BouncePush {
+struct RelaxPush {
     gain: [f32; 3],
-    count: u32,
-    first: u32,
-    last: u32,
     meets: u32,
 }
 
@@ -263,6 +301,16 @@ struct RunBlock {
     /// The first smallest run of each cluster, and where those end in it.
     smallest: [u32; BLOCK_CLUSTERS],
     ends: [RunEnds; BLOCK_CLUSTERS],
+}
+
+impl RunBlock {
+    /// Numbers of its smallest runs, and the places of their vertices.
+    fn smallest_runs(&self) -> impl Iterator<Item = (usize, Range<usize>)> {
+        let clusters = (self.vertex_first as usize..).step_by(RUNS[1]).zip(self.smallest.iter().zip(&self.ends));
+        clusters.flat_map(|(first, (run, ends))| {
+            (*run as usize..).zip(runs(ends).map(move |of| first + of.start..first + of.end))
+        })
+    }
 }
 
 /// An entity whose vertices may have links.
@@ -302,14 +350,18 @@ pub struct BouncedLight<'b> {
 
 pub struct Bounce {
     means: ComputePipeline,
+    relax: ComputePipeline,
     bounce: ComputePipeline,
     texels: bool,
     blocks: Buffer,
     block_count: u32,
     areas: Buffer,
-    ranges: Buffer,
-    links: Buffer,
-    run_light: Buffer,
+    of_vertices: LinkBuffers,
+    of_runs: LinkBuffers,
+    /// Direct light of the smallest runs, and how much of the light that leaves them gets past lamps.
+    run_direct: Buffer,
+    /// Light of all runs, of which steps read one and write the other; the last writes the first.
+    run_light: [Buffer; 2],
     /// Two quads a run: its middle, world, metres, and whether it rests; its mean normal, and the area that faces that way.
     run_places: Buffer,
     run_count: u32,
@@ -318,24 +370,28 @@ pub struct Bounce {
     steps: Steps,
 }
 
-/// Steps that bring bounces.
-#[derive(Clone, Debug, PartialEq)]
+/// A [`LinkList`] on the device, as it was baked.
+struct LinkBuffers {
+    ranges: Buffer,
+    links: Buffer,
+}
+
+impl LinkBuffers {
+    fn new(device: &Arc<Device>, list: &LinkList) -> Result<Self> {
+        Ok(LinkBuffers {
+            ranges: Buffer::with_data(device, "ranges of links", &list.ranges)?,
+            links: Buffer::with_data(device, "links", &list.links)?,
+        })
+    }
+}
+
+/// Steps in which runs pass on light. The last bounce, along links of vertices, follows.
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Steps {
     /// What each adds, by channel: so many times the change that it brought. Zero is a bounce.
     gains: Vec<[f32; 3]>,
     /// Of these, those within groups alone, which come first.
-    alone: u32,
-}
-
-fn pipelines(
-    device: &Arc<Device>,
-    library: &Library,
-    texels: bool,
-    soft: bool,
-    meets: bool,
-) -> Result<[ComputePipeline; 2]> {
-    let pipeline = |name: &str, row: ShaderPermutation| ComputePipeline::new(device, name, &library.shader(&row)?);
-    Ok([pipeline("runs", runs_row(texels, soft))?, pipeline("bounce", bounce_row(texels, soft, meets))?])
+    alone: usize,
 }
 
 impl Bounce {
@@ -350,40 +406,33 @@ impl Bounce {
         self_cells: Option<&Buffer>,
     ) -> Result<Self> {
         let run_count = linked.run_count as u32;
-        let vertex_count = linked.ranges.len() as u32;
-        let run_light = Buffer::new(device, "light of runs", BufferKind::Device, 16 * u64::from(run_count))?;
+        let vertex_count = linked.areas.len() as u32;
+        let of_runs = |name: &str| Buffer::new(device, name, BufferKind::Device, 16 * u64::from(run_count));
         let texels = merge.reads_texels() && linked.fits_texels(device);
         let meets = linked.meets();
-        let Linked { surfaces, far, ranges, links, directions, .. } = linked;
+        let Linked { surfaces, far, .. } = linked;
         let places: Vec<[f32; 4]> = far.runs.iter().flat_map(FarRun::quads).collect();
         let views_hold = texels
             && TexelView::fits(device, vk::Format::R32_UINT, 4 * MOST_ENTRIES)
             && self_cells.is_none_or(|cells| TexelView::fits(device, vk::Format::R32G32_UINT, cells.size_bytes));
         let merge = MergePermutation { variant: merge.variant.restricted(views_hold, true), ..merge };
-        let movers = || {
-            Movers::new(
-                device,
-                library,
-                (surfaces, far),
-                merge,
-                self_cells.is_some(),
-                ranges.len(),
-                [&links, &directions],
-            )
-        };
-        let [means, bounce] = pipelines(device, library, texels, soft, meets)?;
+        let lists = [&linked.of_vertices, &linked.of_runs];
+        let movers = || Movers::new(device, library, (surfaces, far), merge, self_cells.is_some(), vertex_count, lists);
+        let pipeline = |name: &str, row: ShaderPermutation| ComputePipeline::new(device, name, &library.shader(&row)?);
         Ok(Bounce {
-            means,
-            bounce,
+            means: pipeline("runs", means_row(texels, soft))?,
+            relax: pipeline("runs", relax_row(texels, meets))?,
+            bounce: pipeline("bounce", bounce_row(texels, soft, meets))?,
             texels,
             block_count: linked.blocks.len() as u32,
             blocks: Buffer::with_data(device, "runs", &linked.blocks)?,
             areas: Buffer::with_data(device, "areas of vertices", &linked.areas)?,
-            ranges: Buffer::with_data(device, "ranges of links", &ranges)?,
-            links: Buffer::with_data(device, "links", &links)?,
-            run_light,
+            of_vertices: LinkBuffers::new(device, &linked.of_vertices)?,
+            of_runs: LinkBuffers::new(device, &linked.of_runs)?,
+            run_direct: of_runs("direct light of runs")?,
+            run_light: [of_runs("light of runs")?, of_runs("light of runs, every other step")?],
             run_places: Buffer::with_data(device, "places of runs", &places)?,
-            steps: Steps::exactly(1, meets),
+            steps: Steps::default(),
             run_count,
             vertex_count,
             movers: meets.then(movers).transpose()?,
@@ -394,21 +443,20 @@ impl Bounce {
     pub fn set_albedos(&mut self, albedos: &[Vec3]) -> Result<()> {
         let host = self.download()?;
         // An even light, and one that comes in spots.
-        let even = vec![DVec3::ONE; self.vertex_count as usize];
-        let spots = (0..self.vertex_count).map(|v| DVec3::splat(if v / SPOT % 4 == 0 { 2.0 } else { 0.0 }));
-        let errors = relaxation::errors(&[even, spots.collect()].map(|light| host.bounces(light, albedos)));
-        let all = relaxation::within(relaxation::UNSEEN, &errors);
-        let alone = relaxation::within(LEAVING_ERROR, &errors);
-        self.steps = if self.movers.is_some() { Steps::between(&alone, all.steps) } else { Steps::within(&all) };
+        let even = vec![DVec3::ONE; host.smallest.len()];
+        let spots = (0..even.len()).map(|run| DVec3::splat(if run / SPOT % 4 == 0 { 2.0 } else { 0.0 })).collect();
+        let found = relaxation::fewest(&[even, spots].map(|light| host.bounces(light, albedos)));
+        // Light from other groups is passed on within these in the last steps.
+        let met = if self.movers.is_some() { (found.steps / 3).max(1) } else { 0 };
+        let alone = found.steps.saturating_sub(met).max(found.steps.min(1));
+        let gains = found.gains(alone).into_iter().chain(found.gains(met));
+        self.steps = Steps { gains: gains.map(|gain| gain.as_vec3().to_array()).collect(), alone };
         Ok(())
     }
 
     /// Steps for bounces.
     pub fn steps(&self, bounces: Bounces) -> Steps {
-        match bounces {
-            Bounces::All => self.steps.clone(),
-            Bounces::None | Bounces::One => Steps::exactly(bounces.most(), self.movers.is_some()),
-        }
+        if bounces == Bounces::All { self.steps.clone() } else { Steps::default() }
     }
 
     /// Prepares the lists of what moves for the lists' present time.
@@ -418,14 +466,15 @@ impl Bounce {
 
     /// What every vertex sees along its links, for reflections.
     pub fn linked_light(&self) -> LinkedLight<'_> {
-        let Bounce { ranges, run_light, run_places, .. } = self;
-        LinkedLight { ranges, links: self.shown_links(), run_light, run_places }
+        let [links, _] = self.shown_links();
+        let ranges = &self.of_vertices.ranges;
+        LinkedLight { ranges, links, run_light: &self.run_light[0], run_places: &self.run_places }
     }
 
-    /// The links of the last frame.
-    fn shown_links(&self) -> &Buffer {
+    /// The links of vertices and of runs of the last frame.
+    fn shown_links(&self) -> [&Buffer; 2] {
         let boxes = self.movers.as_ref().and_then(|movers| movers.boxes.as_ref());
-        boxes.map_or(&self.links, |boxes| &boxes.links)
+        boxes.map_or([&self.of_vertices.links, &self.of_runs.links], |boxes| boxes.links())
     }
 
     /// How what it reads of the merge is to be bound, if it reads any.
@@ -433,61 +482,73 @@ impl Bounce {
         self.movers.as_ref().map(Movers::permutation)
     }
 
-    /// Adds bounces, step by step, to the direct light of all vertices, which was written before.
+    /// Adds bounces to the direct light of all vertices, which was written before.
     pub fn record<'r>(&'r self, commands: &mut Commands<'r>, work: &BounceWork<'r>) -> Result<()> {
         let BounceWork { entities, light, steps, .. } = work;
-        let quads = vk::Format::R32G32B32A32_SFLOAT;
-        let words = vk::Format::R32_UINT;
-        let vertex_count = self.vertex_count;
-        let count = steps.count();
+        let read = |buffer: &'r Buffer| Bind::read(self.texels, buffer, QUAD_FORMAT);
+        let words = |buffer: &'r Buffer| Bind::read(self.texels, buffer, vk::Format::R32_UINT);
+        let pairs = |buffer: &'r Buffer| Bind::read(self.texels, buffer, vk::Format::R32G32_UINT);
         let met = self.movers.as_ref().zip(work.met.as_ref());
         if let Some((movers, (inputs, _))) = met {
-            movers.hide_links(commands, inputs, &LinkedLight { links: &self.links, ..self.linked_light() })?;
+            let baked = [&self.of_vertices, &self.of_runs];
+            movers.hide_links(commands, inputs, baked, &self.run_places)?;
         }
-        for step in 0..count {
-            let from = if step == 0 { light.direct } else { light.radiosity };
-            let resources = [
-                Bind::Buffer(&self.blocks),
-                Bind::read(self.texels, &self.areas, words)?,
-                Bind::read(self.texels, from, quads)?,
-                Bind::Buffer(&self.run_light),
-                light.lamps.map_or(Ok(Bind::None), |shares| Bind::read(self.texels, shares, words))?,
-            ];
-            commands.dispatch(&self.means, &resources, &(), [CLUSTER_VERTICES * self.block_count, 1, 1])?;
+        let [links, run_links] = self.shown_links();
+        let light_before = |step: usize| &self.run_light[(steps.gains.len() - step) % 2];
+        let run_threads = [CLUSTER_VERTICES * self.block_count, 1, 1];
+        let resources = [
+            Bind::Buffer(&self.blocks),
+            words(&self.areas)?,
+            read(light.direct)?,
+            Bind::Buffer(light_before(0)),
+            Bind::Buffer(&self.run_direct),
+            light.lamps.map_or(Ok(Bind::None), words)?,
+        ];
+        commands.dispatch(&self.means, &resources, &(), run_threads)?;
+        commands.computed();
+        let meet = |commands: &mut Commands<'r>, step| {
+            let Some((movers, (inputs, self_cells))) = met.filter(|_| step == steps.alone) else { return Ok(()) };
+            let of_runs = [&self.run_places, light_before(step)];
+            movers.record(commands, inputs, *self_cells, of_runs, !steps.gains.is_empty())?;
             commands.computed();
-            if let Some((movers, (inputs, self_cells))) = met.filter(|_| step == steps.alone) {
-                let of_runs = [&self.run_places, &self.run_light];
-                movers.record(commands, inputs, *self_cells, of_runs, count > 1)?;
-                commands.computed();
-            }
+            Ok(())
+        };
+        for (step, push) in steps.pushes().enumerate() {
+            meet(commands, step)?;
             let mut resources = vec![
-                Bind::read(self.texels, entities, quads)?,
-                Bind::read(self.texels, &self.ranges, vk::Format::R32G32_UINT)?,
-                Bind::read(self.texels, self.shown_links(), words)?,
-                Bind::read(self.texels, &self.run_light, quads)?,
-                Bind::read(self.texels, light.direct, quads)?,
-                Bind::Buffer(light.radiosity),
-                light.soft_direct.map_or(Ok(Bind::None), |light| Bind::read(self.texels, light, quads))?,
-                light.soft.map_or(Bind::None, Bind::Buffer),
+                Bind::Buffer(&self.blocks),
+                words(&self.areas)?,
+                read(light_before(step))?,
+                Bind::Buffer(light_before(step + 1)),
+                read(&self.run_direct)?,
+                read(entities)?,
+                pairs(&self.of_runs.ranges)?,
+                words(run_links)?,
             ];
             if let Some(movers) = &self.movers {
-                resources.push(Bind::read(self.texels, &movers.incoming, quads)?);
+                resources.push(read(&movers.incoming)?);
             }
-            let push = BouncePush {
-                gain: steps.gains[step as usize],
-                count: vertex_count,
-                first: u32::from(step == 0),
-                // Pixels read the last step alone.
-                last: u32::from(step + 1 == count),
-                meets: u32::from(step >= steps.alone),
-            };
-            commands.dispatch(&self.bounce, &resources, &push, [vertex_count, 1, 1])?;
-            if step + 1 < count {
-                commands.computed();
+            if step > 0 {
                 commands.barrier(Access::ComputeWrite, Access::ComputeWrite);
             }
+            commands.dispatch(&self.relax, &resources, &push, run_threads)?;
+            commands.computed();
         }
-        Ok(())
+        meet(commands, steps.gains.len())?;
+        let mut resources = vec![
+            read(entities)?,
+            pairs(&self.of_vertices.ranges)?,
+            words(links)?,
+            read(&self.run_light[0])?,
+            read(light.direct)?,
+            Bind::Buffer(light.radiosity),
+            light.soft_direct.map_or(Ok(Bind::None), read)?,
+            light.soft.map_or(Bind::None, Bind::Buffer),
+        ];
+        if let Some(movers) = &self.movers {
+            resources.push(read(&movers.incoming)?);
+        }
+        commands.dispatch(&self.bounce, &resources, &self.vertex_count, [self.vertex_count, 1, 1])
     }
 }
 
@@ -508,8 +569,15 @@ pub struct BounceWork<'w> {
     pub met: Option<(MergeInputs<'w>, Option<&'w Buffer>)>,
 }
 
-pub fn runs_row(texels: bool, soft: bool) -> ShaderPermutation {
-    ShaderPermutation::new("runs.comp", 4).define("TEXEL", texels).define("LAMPS", soft)
+/// Light of all runs from that of their vertices.
+pub fn means_row(texels: bool, soft: bool) -> ShaderPermutation {
+    ShaderPermutation::new("runs.comp", 4).define("TEXEL", texels).define("RELAX", false).define("LAMPS", soft)
+}
+
+/// A step of it.
+pub fn relax_row(texels: bool, movers: bool) -> ShaderPermutation {
+    let row = links::macros(ShaderPermutation::new("runs.comp", 4));
+    row.define("TEXEL", texels).define("RELAX", true).define("MOVERS", movers)
 }
 
 pub fn bounce_row(texels: bool, soft: bool, movers: bool) -> ShaderPermutation {

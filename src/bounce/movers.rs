@@ -12,7 +12,7 @@
 //! tells the visibility volume, if the scene has one.
 
 use super::boxes::Boxes;
-use super::{LinkedEntity, LinkedLight};
+use super::{LinkBuffers, LinkList, LinkedEntity};
 use crate::bake::links::{self, RUNS, Runs};
 use crate::error::Result;
 use crate::field::cuboid::Cuboid;
@@ -192,8 +192,8 @@ impl Movers {
         (surfaces, far): (Surfaces, FarRuns),
         permutation: MergePermutation,
         self_shadows: bool,
-        vertices: usize,
-        links: [&[u32]; 2],
+        vertex_count: u32,
+        lists: [&LinkList; 2],
     ) -> Result<Self> {
         let [outgoing, distant, movers] = pipelines(device, library, &permutation, self_shadows)?;
         // No buffer is empty.
@@ -210,14 +210,14 @@ impl Movers {
             movers_data: Upload::new(device, "movers", size_of_val(&surfaces.movers[..]).max(32) as u64)?,
             runs: buffer("runs of movers", bytemuck::cast_slice(&surfaces.runs))?,
             light: Buffer::zeros(device, "light of movers", (16 * OUTGOING * surfaces.rests.len()) as u64)?,
-            incoming: Buffer::zeros(device, "light from other groups", 16 * vertices as u64)?,
+            incoming: Buffer::zeros(device, "light from other groups", 16 * u64::from(vertex_count))?,
             clusters: Upload::new(device, "clusters of movers", 64)?,
             entries: Upload::new(device, "lists of movers", 64)?,
             cluster_count: 0,
             pairs: Upload::new(device, "distant movers", 64)?,
             pair_count: 0,
             spheres: Upload::on_device(device, "distant movers as spheres", 64)?,
-            boxes: Boxes::new(device, library, &surfaces.boxes, links, &permutation)?,
+            boxes: Boxes::new(device, library, &surfaces.boxes, lists, &permutation)?,
             edges: buffer("boxes that move", &edges)?,
             permutation,
             surfaces,
@@ -254,10 +254,12 @@ impl Movers {
         &'r self,
         commands: &mut Commands<'r>,
         inputs: &MergeInputs<'r>,
-        baked: &LinkedLight<'r>,
+        baked: [&'r LinkBuffers; 2],
+        run_places: &'r Buffer,
     ) -> Result<()> {
         let Some(boxes) = &self.boxes else { return Ok(()) };
-        boxes.record(commands, inputs, (&self.clusters, self.cluster_count), baked, &self.edges)?;
+        let places = [run_places, &self.edges];
+        boxes.record(commands, inputs, (&self.clusters, self.cluster_count), baked, places)?;
         commands.computed();
         Ok(())
     }

@@ -3,9 +3,8 @@
 use super::boxes::{LEAST_COSINE, NARROWED};
 use super::movers::{Movers, OUTGOING, OVER, SMOOTH, UNFACED};
 use super::relaxation::MOST_STEPS;
-use super::{Bounce, RunBlock, Steps};
-use crate::bake::cluster_order::runs;
-use crate::bake::links::{RUNS, pack, unpack, unpack_direction};
+use super::{BLOCK_CLUSTERS, Bounce, LinkBuffers, RunBlock, Steps};
+use crate::bake::links::{self, COUNT_BITS, RUNS, pack, unpack, unpack_direction};
 use crate::error::Result;
 use crate::field::cuboid::Cuboid;
 use crate::field::self_visibility;
@@ -18,7 +17,8 @@ use crate::sh::lobe::clamped_cosine;
 use glam::{DVec3, Vec3, Vec4, Vec4Swizzles};
 use rayon::prelude::*;
 use std::f64::consts::PI;
-use std::ops::Range;
+use std::iter::Sum;
+use std::ops::{Mul, Range};
 
 /// What the passes read of the scene and of light.
 pub struct TwinInput<'t> {
@@ -48,38 +48,48 @@ impl Bounce {
     pub fn twin(&self, input: &TwinInput<'_>, steps: &Steps) -> Result<Vec<DVec3>> {
         let mut host = self.download()?;
         if let Some(movers) = &self.movers {
-            host.links = movers.hidden_links(input, &host, &self.places()?)?;
+            movers.hide_links_twin(input, &mut host, &self.places()?)?;
         }
-        let mut light = input.direct.to_vec();
-        let mut incoming = vec![(DVec3::ZERO, 0.0); light.len()];
-        for step in 0..steps.count() {
-            let passed: Vec<DVec3> = light.iter().zip(input.passes).map(|(light, share)| *light * *share).collect();
-            let of_runs = host.means(&passed);
+        let passed: Vec<DVec3> = input.direct.iter().zip(input.passes).map(|(light, share)| *light * *share).collect();
+        let direct = host.means(|v| passed[v]);
+        let passes = host.means(|v| input.passes[v]);
+        let mut incoming = vec![(DVec3::ZERO, 0.0); input.direct.len()];
+        let mut light = host.widened(&direct);
+        for (step, push) in steps.pushes().enumerate() {
             if let Some(movers) = self.movers.as_ref().filter(|_| step == steps.alone) {
-                movers.twin(input, &of_runs, steps.count() > 1, &mut incoming)?;
+                movers.twin(input, &light, true, &mut incoming)?;
             }
-            let gain = Vec3::from(steps.gains[step as usize]).as_dvec3();
-            let bounced = |(place, (first, entity, count)): (usize, (usize, usize, usize))| {
-                let (met, taken) = incoming[place];
+            let met = host.means(|v| incoming[v].0);
+            let taken = host.means(|v| incoming[v].1);
+            let gain = Vec3::from(push.gain).as_dvec3();
+            let after = |(place, &run): (usize, &usize)| {
+                let (first, entity, count) = host.of_runs.range(run);
                 let albedo = DVec3::from(input.objects[entity].albedo_over_pi);
-                let bounced = PI * albedo * (host.along(first, count, &of_runs) * (1.0 - taken) + met);
-                let found = input.direct[place] + bounced;
-                let further = bounced + gain * (found - light[place]);
-                // No light is negative at the end.
-                let least = if step + 1 == steps.count() { DVec3::ZERO } else { DVec3::MIN };
-                input.direct[place] + further.max(least)
+                let sum = host.of_runs.along(first, count, &light) * (1.0 - taken[place]) + met[place];
+                let found = direct[place] + passes[place] * PI * albedo * sum;
+                found + gain * (found - light[run])
             };
-            light = host.vertices().enumerate().map(bounced).collect();
+            let after: Vec<DVec3> = host.smallest.iter().enumerate().map(after).collect();
+            light = host.widened(&after);
         }
-        Ok(light)
+        if let Some(movers) = self.movers.as_ref().filter(|_| steps.gains.len() == steps.alone) {
+            movers.twin(input, &light, !steps.gains.is_empty(), &mut incoming)?;
+        }
+        let bounced = |(place, (met, taken)): (usize, &(DVec3, f64))| {
+            let (first, entity, count) = host.of_vertices.range(place);
+            let albedo = DVec3::from(input.objects[entity].albedo_over_pi);
+            let sum = host.of_vertices.along(first, count, &light) * (1.0 - taken) + *met;
+            input.direct[place] + (PI * albedo * sum).max(DVec3::ZERO)
+        };
+        Ok(incoming.iter().enumerate().map(bounced).collect())
     }
 
     /// What the links of these vertices lead to, as the last frame has left it.
     pub fn links_of(&self, vertices: Range<usize>) -> Result<Vec<Vec<SeenLink>>> {
         let host = self.download()?;
-        let light: Vec<[f32; 4]> = self.run_light.download(self.run_count as usize)?;
+        let light: Vec<[f32; 4]> = self.run_light[0].download(self.run_count as usize)?;
         let places = self.places()?;
-        let links: Vec<u32> = self.shown_links().download(host.links.len())?;
+        let links: Vec<u32> = self.shown_links()[0].download(host.of_vertices.links.len())?;
         let seen = |link: &u32| {
             let (run, share) = unpack(*link);
             let [x, y, z, rests] = places[run][0].map(f64::from);
@@ -89,8 +99,11 @@ impl Bounce {
                 light: DVec3::from_slice(&light[run].map(f64::from)),
             }
         };
-        let of_vertex = |(first, _, count): (usize, usize, usize)| links[first..][..count].iter().map(seen).collect();
-        Ok(host.vertices().skip(vertices.start).take(vertices.len()).map(of_vertex).collect())
+        let of_vertex = |vertex| {
+            let (first, _, count) = host.of_vertices.range(vertex);
+            links[first..][..count].iter().map(seen).collect()
+        };
+        Ok(vertices.map(of_vertex).collect())
     }
 
     /// Places of all runs, as [`crate::lists::far::FarRun::quads`] has them.
@@ -100,14 +113,23 @@ impl Bounce {
 
     /// What the passes read of links, in host memory.
     pub(super) fn download(&self) -> Result<HostLinks> {
-        let vertex_count = self.vertex_count as usize;
+        let blocks: Vec<RunBlock> = self.blocks.download(self.block_count as usize)?;
+        let smallest = blocks.iter().flat_map(|block| block.smallest_runs()).map(|(run, _)| run).collect();
         Ok(HostLinks {
             run_count: self.run_count as usize,
-            blocks: self.blocks.download(self.block_count as usize)?,
-            areas: self.areas.download(vertex_count)?,
-            ranges: self.ranges.download(vertex_count)?,
-            links: self.links.download((self.links.size_bytes / 4) as usize)?,
+            blocks,
+            smallest,
+            areas: self.areas.download(self.vertex_count as usize)?,
+            of_vertices: self.of_vertices.download(self.vertex_count)?,
+            of_runs: self.of_runs.download(self.run_count)?,
         })
+    }
+}
+
+impl LinkBuffers {
+    fn download(&self, count: u32) -> Result<HostList> {
+        let links = self.links.download((self.links.size_bytes / 4) as usize)?;
+        Ok(HostList { ranges: self.ranges.download(count as usize)?, links })
     }
 }
 
@@ -121,76 +143,92 @@ pub struct SeenLink {
     pub light: DVec3,
 }
 
-/// The links of all vertices, as [`super::Linked`] has them.
+/// The links of all vertices and runs, as [`super::Linked`] has them.
 pub(super) struct HostLinks {
     run_count: usize,
     blocks: Vec<RunBlock>,
+    /// Numbers of the smallest runs.
+    pub smallest: Vec<usize>,
     areas: Vec<f32>,
-    pub ranges: Vec<[u32; 2]>,
+    of_vertices: HostList,
+    of_runs: HostList,
+}
+
+struct HostList {
+    ranges: Vec<[u32; 2]>,
     links: Vec<u32>,
 }
 
-impl HostLinks {
-    /// Mean light of every run.
-    pub fn means(&self, light: &[DVec3]) -> Vec<DVec3> {
-        let of_block = |block: &RunBlock| {
-            let places = block.vertex_first as usize..(block.vertex_first + block.vertex_count) as usize;
-            let mean = |places: Range<usize>| -> DVec3 {
-                let whole: f64 = places.clone().map(|v| f64::from(self.areas[v])).sum();
-                places.map(|v| light[v] * (f64::from(self.areas[v]) / whole.max(1e-30))).sum()
-            };
-            let mut means = vec![(block.large as usize, mean(places.clone()))];
-            for (cluster, start) in places.clone().step_by(RUNS[1]).enumerate() {
-                means.push((block.middle as usize + cluster, mean(start..places.end.min(start + RUNS[1]))));
-                let smallest = (block.smallest[cluster] as usize..).zip(runs(&block.ends[cluster]));
-                means.extend(smallest.map(|(run, of)| (run, mean(start + of.start..start + of.end))));
-            }
-            means
-        };
-        let found: Vec<Vec<(usize, DVec3)>> = self.blocks.par_iter().map(of_block).collect();
-        let mut means = vec![DVec3::ZERO; self.run_count];
-        found.into_iter().flatten().for_each(|(run, mean)| means[run] = mean);
-        means
-    }
-
-    /// Light of all bounces up to the last that there may be steps for, from the first, which is what is given.
-    pub fn bounces(&self, light: Vec<DVec3>, albedos: &[Vec3]) -> Vec<Vec<DVec3>> {
-        let mut bounces = vec![light];
-        for _ in 0..MOST_STEPS {
-            let of_runs = self.means(&bounces[bounces.len() - 1]);
-            let vertices: Vec<_> = self.vertices().collect();
-            let bounced = |&(first, entity, count): &(usize, usize, usize)| {
-                albedos[entity].as_dvec3() * self.along(first, count, &of_runs)
-            };
-            bounces.push(vertices.par_iter().map(bounced).collect());
-        }
-        bounces
-    }
-
-    /// First link, entity and number of links of every vertex.
-    pub fn vertices(&self) -> impl Iterator<Item = (usize, usize, usize)> {
-        (0..self.ranges.len()).map(|place| self.vertex(place))
-    }
-
-    fn vertex(&self, place: usize) -> (usize, usize, usize) {
+impl HostList {
+    /// First link, entity and number of links of a vertex or a run.
+    fn range(&self, place: usize) -> (usize, usize, usize) {
         let [first, packed] = self.ranges[place];
-        (first as usize, (packed >> 8) as usize, (packed & 255) as usize)
+        (first as usize, (packed >> COUNT_BITS) as usize, links::count(packed))
     }
 
     /// Light along links, as a share of the hemisphere times radiosity.
-    pub fn along(&self, first: usize, count: usize, of_runs: &[DVec3]) -> DVec3 {
+    fn along(&self, first: usize, count: usize, of_runs: &[DVec3]) -> DVec3 {
         let links = self.links[first..][..count].iter().map(|link| unpack(*link));
         links.map(|(run, share)| of_runs[run] * f64::from(share)).sum()
     }
 }
 
+impl HostLinks {
+    /// Means of something over the vertices of the smallest runs, by their areas.
+    fn means<T: Sum + Mul<f64, Output = T> + Send>(&self, of_vertex: impl Fn(usize) -> T + Sync) -> Vec<T> {
+        let mean = |(_, places): (usize, Range<usize>)| {
+            let whole: f64 = places.clone().map(|v| f64::from(self.areas[v])).sum();
+            places.map(|v| of_vertex(v) * (f64::from(self.areas[v]) / whole.max(1e-30))).sum()
+        };
+        self.blocks.par_iter().flat_map_iter(|block| block.smallest_runs().map(mean)).collect()
+    }
+
+    /// The light of all runs, from that of the smallest.
+    fn widened(&self, of_smallest: &[DVec3]) -> Vec<DVec3> {
+        let mut light = vec![DVec3::ZERO; self.run_count];
+        for (&run, &found) in self.smallest.iter().zip(of_smallest) {
+            light[run] = found;
+        }
+        for block in &self.blocks {
+            let first = block.vertex_first as usize;
+            let mut sums = [(DVec3::ZERO, 0.0); BLOCK_CLUSTERS];
+            for (run, places) in block.smallest_runs() {
+                let (sum, whole) = &mut sums[(places.start - first) / RUNS[1]];
+                let area: f64 = self.areas[places].iter().map(|area| f64::from(*area)).sum();
+                *sum += area * light[run];
+                *whole += area;
+            }
+            let clusters = (block.vertex_count as usize).div_ceil(RUNS[1]);
+            for (cluster, (sum, whole)) in sums[..clusters].iter().enumerate() {
+                light[block.middle as usize + cluster] = *sum / whole.max(1e-30);
+            }
+            let (sum, whole) = sums.iter().fold((DVec3::ZERO, 0.0), |all, of| (all.0 + of.0, all.1 + of.1));
+            light[block.large as usize] = sum / f64::max(whole, 1e-30);
+        }
+        light
+    }
+
+    /// Light of the smallest runs after all bounces up to the last that there may be steps for, from the first, which is
+    /// what is given.
+    pub fn bounces(&self, light: Vec<DVec3>, albedos: &[Vec3]) -> Vec<Vec<DVec3>> {
+        let mut bounces = vec![light];
+        for _ in 0..MOST_STEPS {
+            let light = self.widened(&bounces[bounces.len() - 1]);
+            let bounced = |&run: &usize| {
+                let (first, entity, count) = self.of_runs.range(run);
+                albedos[entity].as_dvec3() * self.of_runs.along(first, count, &light)
+            };
+            bounces.push(self.smallest.par_iter().map(bounced).collect());
+        }
+        bounces
+    }
+}
+
 impl Movers {
-    /// All links, as boxes leave them.
-    fn hidden_links(&self, input: &TwinInput<'_>, host: &HostLinks, places: &[[[f32; 4]; 2]]) -> Result<Vec<u32>> {
-        let mut links = host.links.clone();
-        let Some(boxes) = &self.boxes else { return Ok(links) };
+    /// Leaves of all links what boxes do not hide.
+    fn hide_links_twin(&self, input: &TwinInput<'_>, host: &mut HostLinks, places: &[[[f32; 4]; 2]]) -> Result<()> {
+        let Some(boxes) = &self.boxes else { return Ok(()) };
         let clusters: Vec<Cluster> = self.clusters.download(self.cluster_count as usize)?;
-        let directions: Vec<u32> = boxes.directions.download(links.len())?;
         let left = |position: DVec3, normal: DVec3, link: u32, direction: u32| {
             let (run, share) = unpack(link);
             let [x, y, z, rests] = places[run][0].map(f64::from);
@@ -211,22 +249,33 @@ impl Movers {
             let share = f64::from(share) * boxes.push.entities().iter().map(visible).product::<f64>();
             pack(share as f32, run as u32).unwrap_or(run as u32)
         };
-        let of_cluster = |cluster: &Cluster| {
-            let of_vertex = |v: usize| {
+        let mut vertices = Vec::new();
+        for cluster in &clusters {
+            for v in 0..cluster.vertex_count as usize {
                 let TwinVertex { position, normal, .. } = (input.vertex)(cluster, v);
                 let normal = input.objects[cluster.receiver as usize].rotation * normal;
-                let (first, _, count) = host.vertex(cluster.radiosity_first as usize + v);
-                let links = host.links[first..][..count].iter().zip(&directions[first..]);
-                let left = links.map(|(link, direction)| left(position, normal, *link, *direction));
-                (first, left.collect::<Vec<_>>())
-            };
-            (0..cluster.vertex_count as usize).map(of_vertex).collect::<Vec<_>>()
-        };
-        let found: Vec<Vec<(usize, Vec<u32>)>> = clusters.par_iter().map(of_cluster).collect();
-        for (first, left) in found.into_iter().flatten() {
-            links[first..][..left.len()].copy_from_slice(&left);
+                vertices.push((cluster.radiosity_first as usize + v, position, normal));
+            }
         }
-        Ok(links)
+        let of_run = |(run, quads): (usize, &[[f32; 4]; 2])| {
+            let [middle, normal] = quads.map(|quad| Vec4::from(quad).xyz().as_dvec3());
+            (run, middle, normal)
+        };
+        let runs: Vec<_> = places.iter().enumerate().map(of_run).collect();
+        let lists = [&mut host.of_vertices, &mut host.of_runs];
+        for ((list, hidden), receivers) in lists.into_iter().zip(boxes.hidden()).zip([vertices, runs]) {
+            let directions: Vec<u32> = hidden.directions.download(list.links.len())?;
+            let of_receiver = |&(place, position, normal): &(usize, DVec3, DVec3)| {
+                let (first, _, count) = list.range(place);
+                let links = (first..).take(count);
+                (first, links.map(|k| left(position, normal, list.links[k], directions[k])).collect::<Vec<_>>())
+            };
+            let found: Vec<(usize, Vec<u32>)> = receivers.par_iter().map(of_receiver).collect();
+            for (first, left) in found {
+                list.links[first..][..left.len()].copy_from_slice(&left);
+            }
+        }
+        Ok(())
     }
 
     /// What every vertex receives from other groups, and the share of its view that they take.

@@ -232,18 +232,21 @@ impl SilhouetteField {
     /// depths. The first byte of each word is the corner nearest to the map's first texel, the second is its neighbour
     /// in the row.
     pub fn cells(&self) -> Vec<[u32; 2]> {
-        let of_side = |map: usize, side: Side| {
-            let px = self.header.edge_px(side);
-            let texels = self.texels(map, side);
-            let word = move |x: usize, y: usize, i: usize| {
-                let corners = [(0, 0), (1, 0), (0, 1), (1, 1)];
-                u32::from_le_bytes(corners.map(|(dx, dy)| texels[2 * ((y + dy) * px + x + dx) + i]))
-            };
-            let last = px.saturating_sub(1);
-            let places = (0..last).flat_map(move |y| (0..last).map(move |x| (x, y)));
-            places.map(move |(x, y)| [word(x, y, 0), word(x, y, 1)])
-        };
-        (0..self.frames.len()).flat_map(|map| Side::ALL.into_iter().flat_map(move |side| of_side(map, side))).collect()
+        let mut cells = Vec::new();
+        for map in 0..self.frames.len() {
+            for side in Side::ALL {
+                let row_bytes = 2 * self.header.edge_px(side).max(1);
+                let rows = || self.texels(map, side).chunks_exact(row_bytes);
+                for (low, high) in rows().zip(rows().skip(1)) {
+                    let corners = low.windows(4).step_by(2).zip(high.windows(4).step_by(2));
+                    cells.extend(corners.map(|(low, high)| {
+                        let word = |i: usize| u32::from_le_bytes([low[i], low[i + 2], high[i], high[i + 2]]);
+                        [word(0), word(1)]
+                    }));
+                }
+            }
+        }
+        cells
     }
 
     /// The bytes of a side of a map, two a texel.

@@ -7,6 +7,11 @@ layout(binding = LAMP_BINDING) uniform textureBuffer lamp_maps;
 layout(binding = LAMP_BINDING + 1) uniform textureBuffer lamp_texels;
 #include "generated/lamp_map_structs.glsl"
 #include "generated/lamp_map_at.glsl"
+#if BLENDS
+#define FOR_OTHERS (push.texel_px > 1) // whether a place is evaluated for those around it too
+#else
+#define FOR_OTHERS false
+#endif
 
 // A place as a part of a lamp sees it.
 struct LampPlace {
@@ -37,10 +42,10 @@ float gap_before(LampPlace at, vec2 tangent) {
     float found = texelFetch(lamp_texels, int(at_texel)).r / at.map.nearest_m;
     float along = dot(at.axes[2], way);
     // What stands before the surface is above its plane, unless that is a facet of a round one and turns away. Of a round
-    // one it is nearer than the place too.
-    float bias = 2.0 * (at.is_round ? ROUND_BIAS : FLAT_BIAS) / px * along;
+    // one it is nearer than the place too, and of a vertex both: in a corner a texel shows the other wall as well.
+    float texel_bias = 2.0 / px * along, bias = (at.is_round ? ROUND_BIAS : FLAT_BIAS) * texel_bias;
     bool above = at.is_round && at.height > 0.0 || dot(at.normal, way) > found * at.height + bias * at.steep;
-    bool nearer = !at.is_round || found > at.inverse * along + at.inverse * bias;
+    bool nearer = FACINGS > 1 && !at.is_round || found > at.inverse * (along + ROUND_BIAS * texel_bias);
     return along > 0.0 && above && nearer ? found / max(along, 1e-6) - at.inverse : -1.0;
 }
 
@@ -115,8 +120,8 @@ float lamp_share(LampMap map, uint part, vec3 place, vec3 normal, bool is_round,
     do {
         hidden[k] = hidden_share(at, square, k == 0 ? blur : blur + moved);
         k++;
-    } while (k < (push.texel_px > 1 ? 2 : 1));
-    vec2 around = push.texel_px > 1 ? hidden[1] : hidden[0];
+    } while (k < (FOR_OTHERS ? 2 : 1));
+    vec2 around = FOR_OTHERS ? hidden[1] : hidden[0];
     bool is_edge = max(hidden[0].x, around.x) > 0.001 && min(hidden[0].x, around.x) < 0.999;
     float gap = (hidden[0].y + around.y) / max(hidden[0].x + around.x, 1e-6);
     float half_width = gap * min(length(at.edges[0]), length(at.edges[1])) + blur;

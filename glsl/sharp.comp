@@ -63,6 +63,12 @@ void main() {
     vec4 facing = vertex_quad(at + 1);
     surface.facings[0] = facing_of(receiver, facing.xyz, 1.0, cluster.self_first, v);
     told_suns = uint(facing.w);
+#if LAMP_MAPS
+    surface.ground = surface.facings[0].normal;
+    surface.lifted = vec3(0.0);
+    surface.is_round = false;
+    surface.light_maps = receiver.light_maps;
+#endif
     vec4 sum = soft_at(cluster.radiosity_first + v);
 #if EDGES
     vec3 soft = sum.rgb;

@@ -96,9 +96,10 @@ struct Facing {
 };
 
 #define MAPS (SUN_MAPS || LAMP_MAPS)
-#if MAPS && BLENDS
+#if LAMP_MAPS || MAPS && BLENDS
+#define LOOKS_UP_MAPS 1
 const mat2 NEXT_TAP = mat2(-0.7373688, 0.6754903, -0.6754903, -0.7373688); // the golden angle
-#if SUN_MAPS
+#if SUN_MAPS && BLENDS
 #include "sun_map.glsl"
 #endif
 #if LAMP_MAPS
@@ -115,7 +116,7 @@ struct Surface {
 #if EDGES
     float step;    // farthest that a neighbouring vertex or pixel is, metres
 #endif
-#if MAPS && BLENDS
+#if LOOKS_UP_MAPS
     vec3 ground;   // normal of the triangle, world
     vec3 lifted;   // to the round surface that the triangle stands for (Hanika, Ray Tracing Gems II, chapter 4), metres
     bool is_round; // whether it stands for one
@@ -397,7 +398,7 @@ vec4 part_shares(Surface surface, SeenLight light, Block block) {
 #if SELF
             // A part's radius is small enough for its sine to stand for it.
             bool shadows = facing.self_first != NONE;
-#if MAPS && BLENDS
+#if LOOKS_UP_MAPS
             shadows = shadows && (surface.light_maps & current_map) == 0;
 #endif
             vec3 toward = direction;
@@ -608,7 +609,7 @@ vec3 chain_sum(Surface surface, uint i, uint end) {
     bool hides_around = (told & ALL_SUNS << MOST_SUNS) != 0;
     i = hides_around ? end : i;
 #endif
-#if MAPS && BLENDS
+#if LOOKS_UP_MAPS
     current_map = shining.light_maps;
 #endif
     uint first_block = light.fine >= 1.0 ? 1 : 0, last_block = light.fine <= 0.0 ? 0 : 4;
@@ -729,7 +730,7 @@ vec3 chain_sum(Surface surface, uint i, uint end) {
         }
     } while (is_kind(packed, ENTRY_GLOBE));
 #endif
-#if LAMP_MAPS && BLENDS
+#if LAMP_MAPS
     if (current_map >= uint(LAMP_BIT)) {
         uint first = 4 * (findMSB(current_map) - findMSB(LAMP_BIT)), k = 0;
         vec3 place = surface.position + surface.lifted;
@@ -745,14 +746,19 @@ vec3 chain_sum(Surface surface, uint i, uint end) {
         edges[0] = is_panel(light) ? half_edges[0] : edges[0];
         edges[1] = is_panel(light) ? half_edges[1] : edges[1];
 #endif
+#if EDGES
+        float step = surface.step;
+#else
+        const float step = 0.0;
+#endif
         float seen[4] = float[](1.0, 1.0, 1.0, 1.0), most_steps[4] = float[](0.0, 0.0, 0.0, 0.0);
         uint parts;
         do {
             LampMap map = lamp_map_at(first + k);
-            parts = map.parts;
+            parts = unblocked > 0.0 ? map.parts : 0;
             float steps;
             seen[k] = lamp_share(map, k, place + (surface.origin - map.middle), ground, surface.is_round, edges, square,
-                                 surface.step, steps);
+                                 step, steps);
             most_steps[k] = steps;
             k++;
         } while (k < parts);
@@ -762,7 +768,9 @@ vec3 chain_sum(Surface surface, uint i, uint end) {
         EACH for (uint part = 0; part < 4; part++) {
             set_block(shares, part + 1, open[part] * of_block(shares, part + 1));
         }
+#if EDGES
         nearest = max(max(nearest, max(most_steps[0], most_steps[1])), max(most_steps[2], most_steps[3]));
+#endif
     }
 #endif
     float passed = 0.0;

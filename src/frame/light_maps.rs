@@ -1,4 +1,4 @@
-//! The maps of suns and lamps, for pixels that evaluate lights.
+//! The maps of suns, for pixels that evaluate lights, and of lamps, for vertices too.
 
 use super::Frame;
 use crate::bake::surfaces::{CrispSun, crisp_suns};
@@ -102,12 +102,12 @@ pub(super) struct ToldSun {
 }
 
 impl Frame {
-    /// Draws the maps once any pixels evaluate lights.
+    /// Draws the maps of lamps, and those of suns once any pixels evaluate lights.
     pub(super) fn fit_maps(&mut self) -> Result<()> {
-        let Some(sharp) = self.sharp.as_ref().map(|sharp| sharp.permutation).filter(|_| self.wants_edges()) else {
-            return Ok(());
-        };
-        if !sharp.sun_maps && !sharp.lamp_maps || self.sun_maps.is_some() || self.lamp_maps.is_some() {
+        let Some(sharp) = self.sharp.as_ref().map(|sharp| sharp.permutation) else { return Ok(()) };
+        let wants_suns = sharp.sun_maps && self.sun_maps.is_none() && self.wants_edges();
+        let wants_lamps = sharp.lamp_maps && self.lamp_maps.is_none();
+        if !wants_suns && !wants_lamps {
             return Ok(());
         }
         let casters = self.map_casters();
@@ -124,11 +124,11 @@ impl Frame {
             log::debug!("maps of {} lamps: {} bytes", lamps.len(), maps.texels.size_bytes);
             Ok(maps)
         };
-        let sun_maps = sharp.sun_maps.then(suns).transpose()?;
-        let lamp_maps = sharp.lamp_maps.then(lamps).transpose()?;
+        let sun_maps = wants_suns.then(suns).transpose()?;
+        let lamp_maps = wants_lamps.then(lamps).transpose()?;
         drop(casters);
-        self.sun_maps = sun_maps;
-        self.lamp_maps = lamp_maps;
+        self.sun_maps = sun_maps.or(self.sun_maps.take());
+        self.lamp_maps = lamp_maps.or(self.lamp_maps.take());
         Ok(())
     }
 

@@ -368,6 +368,7 @@ impl Frame {
             shown: self.kept_for_gloss().map(|[_, lights, shares]| [lights, shares]),
             lamps: self.radiosity.lamps(),
             irradiances: self.radiosity.irradiances(),
+            lamp_maps: self.lamp_maps.as_ref().map(|found| [&found.maps, &found.texels]),
         }
     }
 

@@ -6,7 +6,7 @@ use crate::field::quantity::channel_stride;
 use crate::field::sheet::{Rectangle, Sheet};
 use crate::field::sub_light::LampFace;
 use crate::field::{Fit, self_visibility};
-use crate::layout::{self, CLUSTER_VERTICES, NONE, pack_suns};
+use crate::layout::{self, CLUSTER_VERTICES, MOST_SUN_MAPS, NONE, pack_suns};
 use crate::lists::gather::{ClusterBounds, EntityBounds, Globe, Occludes, OutlineShape, OutlineView, SceneBounds};
 use crate::lists::incremental::{Member, State};
 use crate::lists::sight::TriangleRun;
@@ -22,11 +22,16 @@ impl Frame {
     pub(super) fn state(&self, placements: &[Placement]) -> State {
         let of_entities = || placements.iter().enumerate();
         let of_boxes = || self.boxes.iter().map(|[entity, number]| (*entity, *number, &placements[*entity]));
-        let bounds = of_entities().map(|(index, p)| self.entity_bounds(index, p));
-        let bounds: Vec<EntityBounds> =
-            bounds.chain(of_boxes().map(|(entity, number, p)| self.box_bounds(entity, number, p))).collect();
         let sun_bits = self.sun_bits(placements);
         let light_maps = self.light_map_bits(placements);
+        let lamp_maps = |entity: usize| light_maps[entity] >> MOST_SUN_MAPS;
+        let bounds = of_entities()
+            .map(|(index, p)| EntityBounds { lamp_maps: lamp_maps(index), ..self.entity_bounds(index, p) });
+        let bounds = bounds.chain(of_boxes().map(|(entity, number, p)| EntityBounds {
+            lamp_maps: lamp_maps(entity),
+            ..self.box_bounds(entity, number, p)
+        }));
+        let bounds: Vec<EntityBounds> = bounds.collect();
         let entities = of_entities().map(|(index, p)| {
             let sun_bits = sun_bits.get(&index).copied().unwrap_or(0);
             layout::DeviceEntity { sun_bits, light_maps: light_maps[index], ..self.entity(index, p) }
@@ -127,6 +132,7 @@ impl Frame {
             sheet: self.sheet(index, placement).filter(|_| entity.occludes),
             radiance: f64::from(entity.emission.max_element()) * brightest,
             facing,
+            lamp_maps: 0,
         }
     }
 
@@ -230,6 +236,7 @@ impl Frame {
             sheet: None,
             radiance: 0.0,
             facing: None,
+            lamp_maps: 0,
         }
     }
 

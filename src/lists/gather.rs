@@ -69,9 +69,12 @@ pub fn gather(scope: &Scope<'_>, candidates: &Candidates, out: &mut Vec<u32>) ->
             {
                 return CullResult::LeftOff;
             }
-            match light.filter(|light| sharp && *light != occluder) {
-                Some(light) => scope.outline_result(occluder as usize, light),
-                None => CullResult::Listed,
+            let Some(light) = light.filter(|light| sharp && *light != occluder) else { return CullResult::Listed };
+            match scope.outline_result(occluder as usize, light) {
+                CullResult::Listed | CullResult::Encloses if scope.scene.is_mapped(occluder, light) => {
+                    CullResult::LeftOff
+                }
+                result => result,
             }
         }));
     };

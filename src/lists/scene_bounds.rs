@@ -105,6 +105,8 @@ pub struct EntityBounds {
     pub facing: Option<(DVec3, f64)>,
     /// The rectangle by which it casts shadows.
     pub sheet: Option<Sheet>,
+    /// Bits of the maps of lamps that it stands in, or that it has.
+    pub lamp_maps: u32,
 }
 
 /// What tells the outline of an occluder.
@@ -159,6 +161,11 @@ pub struct SceneBounds {
 }
 
 impl SceneBounds {
+    /// Whether the map of a lamp tells what an occluder hides of it.
+    pub fn is_mapped(&self, occluder: u32, lamp: u32) -> bool {
+        self.entities[occluder as usize].lamp_maps & self.entities[lamp as usize].lamp_maps != 0
+    }
+
     /// Whether an occluder's outline is that of a box.
     pub fn is_cuboid(&self, entity: usize) -> bool {
         let outline = self.outlines.get(entity).and_then(Option::as_ref);

@@ -67,6 +67,8 @@ const LAMP_STEPS: u32 = 6;
 /// Halvings of the step in which a ray comes out from behind something. With two the edges of a lampshade's light are off
 /// by 0.0185 of all light, with one by 0.028.
 const HALVINGS: u32 = 3;
+/// First binding of the maps of lamps.
+const LAMP_BINDING: u32 = 13;
 /// Share of its gap that something must still leave where a ray that passes behind it meets it.
 const STILL_THERE: f64 = 0.8;
 /// How far above a surface something must stand that casts a shadow on it, in texels of the map: above a flat one, and
@@ -131,7 +133,7 @@ pub struct SharpPermutation {
 
 impl SharpPermutation {
     pub fn row(&self) -> ShaderPermutation {
-        let row = self.shared(ShaderPermutation::new("sharp.comp", 4));
+        let row = self.shared(ShaderPermutation::new("sharp.comp", 4)).define("LAMP_BINDING", LAMP_BINDING);
         row.define("SHOWN_QUADS", self.shown_quads()).number("EDGE_REACH", EDGE_REACH)
     }
 
@@ -286,6 +288,8 @@ pub struct SharpInputs<'b> {
     pub lamps: Option<&'b Buffer>,
     /// Where the irradiances of all vertices by sharp lights go, and by how many, in the permutation that finds edges.
     pub irradiances: Option<(&'b Buffer, u32)>,
+    /// Maps of lamps and their texels, in the permutation that reads them.
+    pub lamp_maps: Option<[&'b Buffer; 2]>,
 }
 
 #[repr(C)]
@@ -319,7 +323,7 @@ impl Sharp {
         let irradiances = inputs.irradiances.filter(|_| edges);
         let read = |buffer: &'r Buffer, format| Bind::read(reads == Reads::Texels, buffer, format);
         let quads = vk::Format::R32G32B32A32_SFLOAT;
-        let resources = [
+        let mut resources = vec![
             read(inputs.entities, quads)?,
             read(inputs.entries, ENTRY_FORMAT)?,
             read(inputs.clusters, CLUSTER_FORMAT)?,
@@ -334,6 +338,10 @@ impl Sharp {
             inputs.lamps.map_or(Bind::None, Bind::Buffer),
             irradiances.map_or(Bind::None, |(buffer, _)| Bind::Buffer(buffer)),
         ];
+        if let Some([maps, texels]) = inputs.lamp_maps {
+            resources.push(Bind::Texel(TexelView::new(maps, quads)?));
+            resources.push(Bind::Texel(TexelView::new(texels, vk::Format::R32_SFLOAT)?));
+        }
         let elements = [cluster_count * CLUSTER_VERTICES, 1, 1];
         let Some((_, kept_lights)) = irradiances else {
             return commands.dispatch(&self.pipeline, &resources, &(), elements);

@@ -30,19 +30,36 @@ fn wall(position: [f32; 3]) -> EntityData {
     EntityData { rotation: turned(Vec3::X, 90.0), ..stands("slab", position) }
 }
 
-/// Relative RMS of a scene's picture against rays through its pixels, direct light alone.
-fn picture_error(gpu: &Gpu, scene: &Scene) -> f64 {
-    error_with(gpu, scene, Bounces::None)
+/// A sun of one grey, and a uniform sky of another.
+fn sunny(toward: impl Into<Vec3>, angle_deg: f32, radiance: f32, sky: f32) -> EnvironmentData {
+    let sun = Sun { toward: toward.into(), angle_deg, radiance: Vec3::splat(radiance) };
+    let uniform = (sky > 0.0).then(|| Vec3::splat(sky));
+    EnvironmentData { uniform, sun: Some(sun), ..EnvironmentData::default() }
 }
 
-/// Pictures of a scene that is refined.
-fn options(bounces: Bounces) -> frame::Options {
-    let bake = bake::Options { groups: true, vertices: 12_000, ..bake::Options::default() };
-    frame::Options { size: SIZE, bake, bounces, ..frame::Options::default() }
+/// A place around the y axis, the `i`th of `sides`.
+fn around(i: u32, sides: u32, radius: f32, y: f32) -> Vec3 {
+    let [x, z] = (radius * Vec2::from_angle(TAU * i as f32 / sides as f32)).to_array();
+    Vec3::new(x, y, z)
 }
 
-fn error_with(gpu: &Gpu, scene: &Scene, bounces: Bounces) -> f64 {
-    let found = gpu.picture(scene, options(bounces), f32::INFINITY);
+/// Asserts that a scene's picture is off rays by less than `most`, direct light alone.
+#[track_caller]
+fn assert_near_rays(scene: SceneBuilder, most: f64) {
+    let Some(gpu) = gpu() else { return };
+    let error = error(&gpu, &scene.build().unwrap(), Bounces::None);
+    assert!(error < most, "{error}");
+}
+
+/// Pictures of a scene that is refined to so many vertices.
+fn options(vertices: u32) -> frame::Options {
+    let bake = bake::Options { groups: true, vertices, ..bake::Options::default() };
+    frame::Options { size: SIZE, bake, ..frame::Options::default() }
+}
+
+/// Relative RMS of a scene's picture against rays through its pixels.
+fn error(gpu: &Gpu, scene: &Scene, bounces: Bounces) -> f64 {
+    let found = gpu.picture(scene, frame::Options { bounces, ..options(12_000) }, f32::INFINITY);
     let placements = scene.at(0.0);
     let world = World::of(scene, &placements);
     let bounces = u32::from(bounces != Bounces::None);
@@ -57,7 +74,6 @@ fn error_with(gpu: &Gpu, scene: &Scene, bounces: Bounces) -> f64 {
 /// is behind the lamp hides it, as seen from a vertex or from between vertices.
 #[test]
 fn a_room_of_one_mesh_is_lit_by_its_ceiling_lamp() {
-    let Some(gpu) = gpu() else { return };
     let solid = generate::cuboid(Vec3::splat(2.0), 1);
     let open = part(&solid, |corners| corners.iter().any(|&v| solid.normals[v as usize].z < 0.5));
     let scene = Scene::builder()
@@ -68,8 +84,7 @@ fn a_room_of_one_mesh_is_lit_by_its_ceiling_lamp() {
         .entity(EntityData { albedo: Vec3::splat(0.7).into(), ..EntityData::of_mesh("room") })
         .entity(EntityData { rotation: turned(Vec3::Y, 17.0), ..stands("box", [-0.35, -0.4, -0.3]) })
         .entity(EntityData { rotation: turned(Vec3::X, 180.0), ..shines("lamp", [0.0, 0.99, 0.0], 10.0) });
-    let error = picture_error(&gpu, &scene.build().unwrap());
-    assert!(error < 0.06, "{error}");
+    assert_near_rays(scene, 0.06);
 }
 
 /// Half of a dome's section: radii and heights.
@@ -85,7 +100,7 @@ fn no_light_comes_through_a_lamp_shade() {
     let dome_heights = [(0.5, 0.03), (0.58, 0.03), (0.64, 0.15)];
     let in_dome = dome_heights.map(|(height, most)| (&DOME[..], height, most));
     for (profile, height, most) in [(&ring[..], 0.62, 0.03)].into_iter().chain(in_dome) {
-        let error = picture_error(&gpu, &under_a_shade(profile, height).build().unwrap());
+        let error = error(&gpu, &under_a_shade(profile, height).build().unwrap(), Bounces::None);
         assert!(error < most, "{height}: {error}");
     }
 }
@@ -98,7 +113,8 @@ fn a_cord_is_not_lit_from_its_end() {
         .camera(Camera::new([0.1, 1.35, 1.3], [0.0, 1.25, 0.0]))
         .mesh("cord", generate::cuboid(Vec3::new(0.03, 1.2, 0.03), 1))
         .entity(stands("cord", [0.0, 1.23, 0.0]));
-    let found = gpu.picture(&scene.build().unwrap(), options(Bounces::None), f32::INFINITY);
+    let options = frame::Options { bounces: Bounces::None, ..options(12_000) };
+    let found = gpu.picture(&scene.build().unwrap(), options, f32::INFINITY);
     let (above, below) = found.split_at(3 * (52 * SIZE[0]) as usize);
     let brightest = |pixels: &[f32]| pixels.iter().copied().fold(0.0, f32::max);
     assert!(brightest(above) < 0.01 * brightest(below), "{} of {}", brightest(above), brightest(below));
@@ -121,7 +137,7 @@ fn glass_around_a_bulb_takes_its_share() {
             .entity(stands("post", [0.4, 0.15, 0.1]))
             .entity(EntityData { opacity: 0.4, ..stands("glass", [0.0, 0.4, 0.0]) })
             .entity(shines("bulb", [0.0, 0.4, 0.02], 10.0));
-        let error = picture_error(&gpu, &scene.build().unwrap());
+        let error = error(&gpu, &scene.build().unwrap(), Bounces::None);
         // 0.068 where vertices alone evaluate lights, and 0.3 or more without a share.
         assert!(error < 0.08, "{name}: {error}");
     }
@@ -153,10 +169,7 @@ fn what_is_carried_together_shades_itself_as_at_rest() {
             .entity(at("back", [0.0, 0.54, -0.43]))
             .entity(at("ring", [0.0, 0.12, 0.0]))
             .entity(EntityData { emission: Vec3::splat(10.0), ..at("bulb", [0.1, 0.85, 0.05]) });
-        let bake = bake::Options { groups: true, vertices: 0, ..bake::Options::default() };
-        let scene = scene.build().unwrap();
-        let options = frame::Options { size: [96, 64], bake, ..frame::Options::default() };
-        gpu.picture(&scene, options, f32::INFINITY)
+        gpu.picture(&scene.build().unwrap(), options(0), f32::INFINITY)
     };
     let pairs = picture(vec![Motion::Node(Box::new(node.clone()))]).into_iter().zip(picture(Vec::new()));
     let error = relative_rms(pairs);
@@ -170,8 +183,7 @@ fn under_a_shade(profile: &[[f32; 2]], height: f32) -> SceneBuilder {
     let count = profile.len() as u32;
     let place = |i: u32| {
         let [radius, y] = profile[(i % count) as usize];
-        let around = radius * Vec2::from_angle(TAU * (i / count) as f32 / sides as f32);
-        Vec3::new(around.x, y, around.y)
+        around(i / count, sides, radius, y)
     };
     let mut corners = Vec::new();
     for i in 0..count * sides {
@@ -212,19 +224,16 @@ fn wall_with_window() -> Mesh {
 /// edges that rays find.
 #[test]
 fn a_window_casts_a_patch_of_sunlight_and_its_highlight() {
-    let Some(gpu) = gpu() else { return };
     let gloss = Some(toml::from_str("roughness = 0.4").unwrap());
     for gloss in [None, gloss] {
-        let sky = r#"sun = { toward = [0.3, 0.8, -0.9], angle_deg = 2, radiance = [900, 900, 900] }"#;
         let scene = Scene::builder()
             .camera(Camera::new([0.0, 1.6, 3.4], [0.0, 0.3, 0.0]))
-            .environment(toml::from_str(sky).unwrap())
+            .environment(sunny([0.3, 0.8, -0.9], 2.0, 900.0, 0.0))
             .mesh("wall", wall_with_window())
             .mesh("floor", generate::cuboid(Vec3::new(4.0, 0.1, 4.0), 1))
             .entity(EntityData { gloss, ..stands("floor", [0.0, -0.05, 0.0]) })
             .entity(EntityData::of_mesh("wall"));
-        let error = picture_error(&gpu, &scene.build().unwrap());
-        assert!(error < 0.11, "{error}");
+        assert_near_rays(scene, 0.11);
     }
 }
 
@@ -232,57 +241,43 @@ fn a_window_casts_a_patch_of_sunlight_and_its_highlight() {
 /// closed form, where the maps of its vertices blur the patch (0.55).
 #[test]
 fn a_house_of_one_mesh_has_a_patch_of_sunlight() {
-    let Some(gpu) = gpu() else { return };
     let planes =
         [&[-2.2_f32, -2.0, -0.6, 0.5, 2.0, 2.2][..], &[-0.2, 0.0, 0.8, 1.7, 2.4, 2.6], &[-1.7, -1.5, 1.5, 1.7]];
     let is_wall = |[x, y, z]: [usize; 3]| {
         let is_window = (x, y, z) == (2, 2, 0);
         !is_window && (x == 0 || x == 4 || y == 0 || y == 4 || z == 0)
     };
-    let sky = r#"sun = { toward = [0.3, 0.6, -0.8], angle_deg = 2, radiance = [900, 900, 900] }"#;
     let scene = Scene::builder()
         .camera(Camera::new([0.0, 1.4, 3.4], [0.0, 0.9, 0.0]))
-        .environment(toml::from_str(sky).unwrap())
+        .environment(sunny([0.3, 0.6, -0.8], 2.0, 900.0, 0.0))
         .mesh("house", of_cells(planes, is_wall))
         .entity(EntityData::of_mesh("house"));
-    let error = picture_error(&gpu, &scene.build().unwrap());
-    assert!(error < 0.09, "{error}");
+    assert_near_rays(scene, 0.09);
 }
 
 /// Rods of one mesh have shadows as wide as they are: maps of 32 texels across all of them leave dots (0.066).
 #[test]
 fn thin_bars_of_one_mesh_cast_whole_shadows() {
-    let Some(gpu) = gpu() else { return };
     let rod = |x: f32, lean: f32| {
-        let place = move |i: u32, end: f32| {
-            let (sin, cos) = (std::f32::consts::TAU * i as f32 / 8.0).sin_cos();
-            Vec3::new(x + lean * end + 0.03 * cos, 2.0 * end, 0.03 * sin)
-        };
+        let place = move |i: u32, end: f32| around(i, 8, 0.03, 2.0 * end) + (x + lean * end) * Vec3::X;
         (0..8).flat_map(move |i| [place(i, 0.0), place(i, 1.0), place(i + 1, 1.0), place(i + 1, 0.0)])
     };
     let rods = (0..6).flat_map(|k| rod(0.4 * k as f32 - 1.0, 0.1 * k as f32 - 0.2));
-    let sky = r#"uniform = [0.2, 0.2, 0.2]
-sun = { toward = [0.5, 0.8, -0.4], angle_deg = 1, radiance = [6000, 6000, 6000] }"#;
     let scene = Scene::builder()
         .camera(Camera::new([-1.3, 2.2, 1.3], [-1.3, 0.0, 1.1]))
-        .environment(toml::from_str(sky).unwrap())
+        .environment(sunny([0.5, 0.8, -0.4], 1.0, 6000.0, 0.2))
         .mesh("rods", of_quads("rods", rods.collect()))
         .mesh("ground", Generator::Plane { size_m: 8.0, cells: 16 })
         .entity(EntityData::of_mesh("rods"))
         .entity(EntityData::of_mesh("ground"));
-    let error = picture_error(&gpu, &scene.build().unwrap());
-    assert!(error < 0.04, "{error}");
+    assert_near_rays(scene, 0.04);
 }
 
 /// The sun falls through the window of a round tower of one mesh and past thin rods: its patch on the wall across has the
 /// window's edges and the rods' shadows, which were as fine as the wall's vertices (0.34).
 #[test]
 fn a_round_tower_has_a_patch_of_sunlight() {
-    let Some(gpu) = gpu() else { return };
-    let place = |i: u32, y: f32| {
-        let (sin, cos) = (TAU * i as f32 / 24.0).sin_cos();
-        Vec3::new(2.0 * cos, y, 2.0 * sin)
-    };
+    let place = |i: u32, y: f32| around(i, 24, 2.0, y);
     let heights = [0.0, 1.5, 2.5, 3.0];
     let rows = heights.iter().zip(&heights[1..]);
     let wall = rows.flat_map(|(&low, &high)| {
@@ -294,51 +289,41 @@ fn a_round_tower_has_a_patch_of_sunlight() {
     let wall: Vec<Vec3> = wall.collect();
     let rod = |z: f32| [[0.0, z], [0.0, z + 0.04], [3.0, z + 0.04], [3.0, z]].map(|[y, z]| Vec3::new(1.2, y, z));
     let rods: Vec<Vec3> = [-0.4, -0.2, 0.0, 0.2, 0.4].into_iter().flat_map(rod).collect();
-    let sky = r#"sun = { toward = [1, 0.35, 0.05], angle_deg = 0.6, radiance = [9000, 9000, 9000] }"#;
     let scene = Scene::builder()
         .camera(Camera { fov_deg: 60.0, ..Camera::new([0.5, 1.4, 0.0], [-2.0, 0.9, 0.0]) })
-        .environment(toml::from_str(sky).unwrap())
+        .environment(sunny([1.0, 0.35, 0.05], 0.6, 9000.0, 0.0))
         .mesh("tower", of_quads("tower", wall))
         .mesh("rods", of_quads("rods", rods))
         .entity(EntityData::of_mesh("tower"))
         .entity(EntityData::of_mesh("rods"));
-    let error = picture_error(&gpu, &scene.build().unwrap());
-    assert!(error < 0.1, "{error}");
+    assert_near_rays(scene, 0.1);
 }
 
 /// A vault of one sheet ends in a wall that is higher: below the vault no sun comes in along the line where they meet
 /// (0.55).
 #[test]
 fn no_sunlight_comes_in_where_a_vault_meets_a_wall() {
-    let Some(gpu) = gpu() else { return };
     let place = |i: u32, z: f32| {
         let turn = std::f32::consts::PI * i as f32 / 24.0;
         Vec3::new(1.5 * turn.cos(), 1.5 * turn.sin(), z)
     };
     let wall = [[-2.0, -1.0], [2.0, -1.0], [2.0, 3.0], [-2.0, 3.0]].map(|[x, y]| Vec3::new(x, y, 0.0));
     let sheet = (0..24).flat_map(|i| [place(i, 4.0), place(i + 1, 4.0), place(i + 1, 0.0), place(i, 0.0)]);
-    let sky = r#"uniform = [0.02, 0.02, 0.02]
-sun = { toward = [0.5, 0.8, 0.3], angle_deg = 1, radiance = [3000, 3000, 3000] }"#;
     let scene = Scene::builder()
         .camera(Camera::new([0.0, 0.9, 1.6], [0.0, 1.2, 0.0]))
-        .environment(toml::from_str(sky).unwrap())
+        .environment(sunny([0.5, 0.8, 0.3], 1.0, 3000.0, 0.02))
         .mesh("vault", of_quads("vault", sheet.collect()))
         .mesh("wall", of_quads("wall", wall.to_vec()))
         .entity(EntityData::of_mesh("vault"))
         .entity(EntityData::of_mesh("wall"));
-    let error = picture_error(&gpu, &scene.build().unwrap());
-    assert!(error < 0.15, "{error}");
+    assert_near_rays(scene, 0.15);
 }
 
 /// A bulb in a thin open shade, and a ball that swings past: the edge of the shade's light is as soft on the wall as rays
 /// have it (0.044 with outlines).
 #[test]
 fn a_lampshade_has_a_soft_edge() {
-    let Some(gpu) = gpu() else { return };
-    let place = |i: u32, radius: f32, y: f32| {
-        let around = radius * Vec2::from_angle(TAU * i as f32 / 32.0);
-        Vec3::new(around.x, y, around.y)
-    };
+    let place = |i: u32, radius: f32, y: f32| around(i, 32, radius, y);
     let shade = (0..32)
         .flat_map(|i| [place(i, 0.1, 0.15), place(i + 1, 0.1, 0.15), place(i + 1, 0.25, -0.15), place(i, 0.25, -0.15)]);
     let swings = Motion::Orbit { centre: Vec3::ZERO, axis: Vec3::Y, period_s: 5.0 };
@@ -353,14 +338,12 @@ fn a_lampshade_has_a_soft_edge() {
         .entity(stands("shade", [0.0, 1.5, -0.3]))
         .entity(shines("bulb", [0.0, 1.48, -0.3], 20.0))
         .entity(EntityData { motion: vec![swings], ..stands("ball", [0.6, 0.7, 0.0]) });
-    let error = picture_error(&gpu, &scene.build().unwrap());
-    assert!(error < 0.036, "{error}");
+    assert_near_rays(scene, 0.036);
 }
 
 /// A tube shines down from a bent sheet, which lets none of its light through (0.27 with outlines).
 #[test]
 fn no_light_comes_through_the_reflector_of_a_tube() {
-    let Some(gpu) = gpu() else { return };
     let profile = [[-0.16, -0.05], [-0.05, 0.07], [0.05, 0.07], [0.16, -0.05]];
     let at = |x: f32, [z, y]: [f32; 2]| Vec3::new(x, y, z);
     let sheets = profile.iter().zip(&profile[1..]);
@@ -375,14 +358,12 @@ fn no_light_comes_through_the_reflector_of_a_tube() {
         .entity(wall([0.0, 1.1, -1.5]))
         .entity(stands("reflector", [0.0, 1.9, 0.0]))
         .entity(shines("tube", [0.0, 1.9, 0.0], 8.0));
-    let error = picture_error(&gpu, &scene.build().unwrap());
-    assert!(error < 0.22, "{error}");
+    assert_near_rays(scene, 0.22);
 }
 
 /// A lamp in a thin box hangs right below a slab: nothing of its light gets above that.
 #[test]
 fn no_light_comes_through_the_slab_above_a_lamp() {
-    let Some(gpu) = gpu() else { return };
     let scene = Scene::builder()
         .camera(Camera::new([0.2, 2.4, 3.2], [0.0, 0.8, 0.0]))
         .mesh("slab", generate::cuboid(Vec3::new(2.4, 0.1, 2.4), 1))
@@ -391,14 +372,12 @@ fn no_light_comes_through_the_slab_above_a_lamp() {
         .entity(stands("slab", [0.0, 1.2, 0.0]))
         .entity(wall([0.0, 1.1, -1.2]))
         .entity(shines("lamp", [0.0, 1.08, 0.0], 3.0));
-    let error = picture_error(&gpu, &scene.build().unwrap());
-    assert!(error < 0.04, "{error}");
+    assert_near_rays(scene, 0.04);
 }
 
 /// Below a table all lamps above it are hidden, though they are no balls.
 #[test]
 fn several_lamps_leave_a_table_its_shadow() {
-    let Some(gpu) = gpu() else { return };
     let mut scene = Scene::builder()
         .camera(Camera::new([0.0, 2.0, 2.2], [0.0, 0.0, -0.2]))
         .mesh("floor", Generator::Plane { size_m: 4.0, cells: 24 })
@@ -409,14 +388,12 @@ fn several_lamps_leave_a_table_its_shadow() {
     for x in [-0.45, 0.0, 0.4] {
         scene = scene.entity(shines("lamp", [x, 1.95, -0.2], 9.0));
     }
-    let error = picture_error(&gpu, &scene.build().unwrap());
-    assert!(error < 0.05, "{error}");
+    assert_near_rays(scene, 0.05);
 }
 
 /// A slab of a roof lies on a gable: the box around this reaches to above the slab, its faces do not (0.34).
 #[test]
 fn a_gable_casts_no_shadow_on_the_roof_above_it() {
-    let Some(gpu) = gpu() else { return };
     let bent = |place: fn(Vec3) -> Vec3| {
         let solid = generate::cuboid(Vec3::ONE, 1);
         let places = solid.positions.iter().map(|p| place(*p)).collect();
@@ -425,23 +402,19 @@ fn a_gable_casts_no_shadow_on_the_roof_above_it() {
     let gable = bent(|p| Vec3::new(4.0 * p.x * (0.5 - p.y), 0.9 * (0.5 + p.y), 6.0 * p.z));
     let slab = bent(|p| Vec3::new(2.0 * (0.5 + p.x), 0.9 * (0.5 - p.x) + 0.1 * (0.5 + p.y), 6.0 * p.z));
     assert!(gable.is_convex() && slab.is_convex());
-    let sky = r#"uniform = [0.2, 0.2, 0.2]
-sun = { toward = [0.8, 0.6, 0.3], angle_deg = 1, radiance = [6000, 6000, 6000] }"#;
     let scene = Scene::builder()
         .camera(Camera::new([4.0, 4.0, 4.0], [0.0, 0.4, 0.0]))
-        .environment(toml::from_str(sky).unwrap())
+        .environment(sunny([0.8, 0.6, 0.3], 1.0, 6000.0, 0.2))
         .mesh("gable", gable)
         .mesh("slab", slab)
         .entity(EntityData::of_mesh("gable"))
         .entity(EntityData::of_mesh("slab"));
-    let error = picture_error(&gpu, &scene.build().unwrap());
-    assert!(error < 0.05, "{error}");
+    assert_near_rays(scene, 0.05);
 }
 
 /// A rug lies exactly in its floor's plane: neither is dark there (0.5).
 #[test]
 fn what_lies_in_a_floor_takes_no_light_from_it() {
-    let Some(gpu) = gpu() else { return };
     let scene = Scene::builder()
         .camera(Camera::new([0.0, 1.2, 2.6], [0.0, 0.1, 0.0]))
         .environment(EnvironmentData { uniform: Some(Vec3::splat(0.1)), ..EnvironmentData::default() })
@@ -451,8 +424,7 @@ fn what_lies_in_a_floor_takes_no_light_from_it() {
         .entity(EntityData::of_mesh("floor"))
         .entity(EntityData::of_mesh("rug"))
         .entity(shines("lamp", [0.8, 0.7, 0.0], 5.0));
-    let error = picture_error(&gpu, &scene.build().unwrap());
-    assert!(error < 0.04, "{error}");
+    assert_near_rays(scene, 0.04);
 }
 
 /// Walls of one square each throw the light of a lamp before their middles, though their corners are dark.
@@ -467,14 +439,13 @@ fn walls_of_one_square_throw_light_on_each_other() {
         .entity(EntityData { rotation: turned(Vec3::X, 90.0), ..stands("wall", [0.0, 1.5, -1.5]) })
         .entity(EntityData { rotation: turned(Vec3::X, 180.0), ..stands("wall", [0.0, 2.2, 0.0]) })
         .entity(shines("lamp", [0.0, 0.5, 0.0], 6.0));
-    let error = error_with(&gpu, &scene.build().unwrap(), Bounces::One);
+    let error = error(&gpu, &scene.build().unwrap(), Bounces::One);
     assert!(error < 0.05, "{error}");
 }
 
 /// The top of a pole reaches into a bulb, whose lower part it hides from the wall behind (0.21).
 #[test]
 fn a_pole_hides_the_part_of_its_lamp_that_it_reaches_into() {
-    let Some(gpu) = gpu() else { return };
     let scene = Scene::builder()
         .camera(Camera::new([0.0, 0.6, 2.0], [0.0, 0.6, 0.0]))
         .mesh("wall", Generator::Plane { size_m: 4.0, cells: 40 })
@@ -483,8 +454,7 @@ fn a_pole_hides_the_part_of_its_lamp_that_it_reaches_into() {
         .entity(EntityData { rotation: turned(Vec3::X, 90.0), ..stands("wall", [0.0, 0.8, -0.4]) })
         .entity(EntityData { receives: Some(false), ..stands("pole", [0.0, 0.75, 0.0]) })
         .entity(shines("lamp", [0.0, 1.52, 0.0], 30.0));
-    let error = picture_error(&gpu, &scene.build().unwrap());
-    assert!(error < 0.1, "{error}");
+    assert_near_rays(scene, 0.1);
 }
 
 /// A strip of sun 0.2 m wide comes through the roof of a hall. What it meets throws light by its area, not by how many
@@ -494,10 +464,9 @@ fn a_pole_hides_the_part_of_its_lamp_that_it_reaches_into() {
 fn a_hall_is_lit_by_the_strip_of_sun_on_its_floor() {
     let Some(gpu) = gpu() else { return };
     let slab = |x: f32, y: f32, z: f32| Generator::Cuboid { size_m: Vec3::new(x, y, z), cells: 1 };
-    let sun = Sun { radiance: Vec3::splat(3e4), toward: Vec3::new(0.5, 1.0, 0.1), angle_deg: 1.0 };
     let turn = turned(Vec3::Y, 90.0);
     let scene = Scene::builder()
-        .environment(EnvironmentData { sun: Some(sun), ..EnvironmentData::default() })
+        .environment(sunny([0.5, 1.0, 0.1], 1.0, 3e4, 0.0))
         .camera(Camera { fov_deg: 60.0, ..Camera::new([-7.0, 1.2, 5.0], [1.0, 1.6, -1.0]) })
         .mesh("floor", slab(16.4, 0.2, 12.4))
         .mesh("long wall", slab(16.4, 5.0, 0.2))
@@ -512,13 +481,11 @@ fn a_hall_is_lit_by_the_strip_of_sun_on_its_floor() {
         .entity(stands("roof", [4.1, 4.0, 0.0]))
         .build()
         .unwrap();
-    let bounces = Bounces::One;
-    let bake = bake::Options { groups: true, vertices: 20_000, ..bake::Options::default() };
-    let options = frame::Options { size: [96, 64], bake, bounces, ..frame::Options::default() };
+    let options = frame::Options { bounces: Bounces::One, ..options(20_000) };
     let found = gpu.picture(&scene, options, f32::INFINITY);
     let world = World::of(&scene, &scene.at(0.0));
     let cast = RayCast { rays: 256, runs: 2, bounces: 1, ..RayCast::default() };
-    let rays = pixels::picture(&world, [96, 64], true, &cast, &|_| ());
+    let rays = pixels::picture(&world, SIZE, true, &cast, &|_| ());
     let dark = found.iter().zip(&rays.linear).filter(|(found, truth)| found.max(**truth) < 0.05);
     let [mine, theirs] = dark.fold([0.0, 0.0], |[a, b], (found, truth)| [a + found, b + truth]);
     let ratio = mine / theirs;
@@ -530,11 +497,10 @@ fn a_hall_is_lit_by_the_strip_of_sun_on_its_floor() {
 #[test]
 fn a_closed_room_in_the_sun_is_dark() {
     let Some(gpu) = gpu() else { return };
-    let sun = Sun { radiance: Vec3::splat(6e4), toward: Vec3::new(0.3, 0.7, -0.6).normalize(), angle_deg: 0.53 };
     let slab = |x: f32, y: f32, z: f32| generate::cuboid(Vec3::new(x, y, z), 1);
     let corners = [[-0.8, 5.0], [0.8, 5.0], [0.8, -5.0], [-0.8, -5.0]].map(|[x, z]| Vec3::new(x, 0.01, z));
     let scene = Scene::builder()
-        .environment(EnvironmentData { sun: Some(sun), ..EnvironmentData::default() })
+        .environment(sunny(Vec3::new(0.3, 0.7, -0.6).normalize(), 0.53, 6e4, 0.0))
         .camera(Camera { fov_deg: 60.0, ..Camera::new([2.5, 1.6, -4.5], [-0.5, 1.0, 4.0]) })
         .mesh("wall", slab(6.2, 3.0, 0.1))
         .mesh("side", slab(0.1, 3.0, 10.0))
@@ -549,9 +515,7 @@ fn a_closed_room_in_the_sun_is_dark() {
         .entity(EntityData::of_mesh("carpet"))
         .build()
         .unwrap();
-    let bake = bake::Options { groups: true, vertices: 20_000, ..bake::Options::default() };
-    let options = frame::Options { size: [96, 64], bake, ..frame::Options::default() };
-    let shown = gpu.picture(&scene, options, f32::INFINITY);
+    let shown = gpu.picture(&scene, options(20_000), f32::INFINITY);
     let mean = shown.iter().sum::<f32>() / shown.len() as f32;
     assert!(mean < 5e-4, "{mean}");
 }
@@ -560,21 +524,18 @@ fn a_closed_room_in_the_sun_is_dark() {
 /// outline hid the half of it (0.55).
 #[test]
 fn sun_through_the_hole_of_a_cave_lights_a_pool() {
-    let Some(gpu) = gpu() else { return };
     let ball = generate::sphere(2.0, 4);
     let toward = Vec3::new(0.3, 1.0, 0.2).normalize();
     let is_hole = |corners: &[u32; 3]| {
         let middle = corners.iter().map(|&v| ball.positions[v as usize]).sum::<Vec3>();
         middle.normalize().dot(toward) > 20.0_f32.to_radians().cos()
     };
-    let sun = Sun { radiance: Vec3::splat(9e3), toward, angle_deg: 1.0 };
     let scene = Scene::builder()
-        .environment(EnvironmentData { sun: Some(sun), ..EnvironmentData::default() })
+        .environment(sunny(toward, 1.0, 9e3, 0.0))
         .camera(Camera { fov_deg: 70.0, ..Camera::new([-1.2, 0.3, 1.2], [0.2, -0.8, -0.1]) })
         .mesh("cave", inside_out(&part(&ball, |corners| !is_hole(corners))))
         .mesh("pool", Generator::Plane { size_m: 2.4, cells: 12 })
         .entity(EntityData::of_mesh("cave"))
         .entity(stands("pool", [0.0, -0.8, 0.0]));
-    let error = picture_error(&gpu, &scene.build().unwrap());
-    assert!(error < 0.35, "{error}");
+    assert_near_rays(scene, 0.35);
 }

@@ -3,7 +3,8 @@
 mod common;
 
 use ash::vk;
-use common::{library, skip, usual_permutation};
+use common::{library, skip};
+use rayon::prelude::*;
 use shadow_fields::bake::assemble::Assemble;
 use shadow_fields::bake::capture::Capture;
 use shadow_fields::bake::project::Project;
@@ -18,7 +19,7 @@ use shadow_fields::draw::pixel_light::{LightImages, Receiver, Step};
 use shadow_fields::draw::smooth::Smooth;
 use shadow_fields::draw::sun_map::SunMaps;
 use shadow_fields::draw::triangles::{Detail, DrawTriangles, Form, Look};
-use shadow_fields::field::{FieldKind, Storage};
+use shadow_fields::field::{FieldKind, Lattice, Storage};
 use shadow_fields::gloss::gloss_row;
 use shadow_fields::gpu::Shader;
 use shadow_fields::gpu::reflect::Reflection;
@@ -26,7 +27,7 @@ use shadow_fields::lists::skip::Skip;
 use shadow_fields::merge::variant::{MergePermutation, Reads, VARIANTS, Variant};
 use shadow_fields::shaders::{FILES, ShaderPermutation};
 use shadow_fields::sharp::SharpPermutation;
-use std::collections::BTreeSet;
+use std::collections::{BTreeSet, HashSet};
 use std::process::Command;
 
 const BANDS: std::ops::RangeInclusive<usize> = 2..=7;
@@ -108,7 +109,6 @@ fn drawing() -> Vec<ShaderPermutation> {
         SharpPermutation { gloss: all, many_shown: all, lamps: false, self_shadows: true, edges: true, ..way }
     });
     let ways = [None, Some(&sharp[0]), Some(&sharp[1])];
-    let grids = [false, true].map(DrawGrid::rows).concat();
     let glossy = ways.into_iter().flat_map(|highlights| {
         let rows = [
             (Detail::Rough, Mirrored::Nothing),
@@ -126,22 +126,18 @@ fn drawing() -> Vec<ShaderPermutation> {
         };
         [of(1), of(4)].concat()
     });
-    let mapped = [false, true].map(SunMaps::rows).concat();
-    let seen = Receiver::ALL.iter().flat_map(|receiver| LightImages::rows(*receiver));
-    let lit = [Step::Coarse, Step::Fine].map(LightImages::select_row).into_iter();
-    let lit = lit.chain(sharp.iter().map(LightImages::evaluate_row));
-    grids
-        .into_iter()
-        .chain(triangles)
-        .chain(mapped)
-        .chain(seen)
-        .chain(lit)
-        .chain([Smooth::fragment()])
-        .chain(
-            ["overlay.vert", "overlay.frag", "show.vert", "show.frag", "sky.frag", "smooth.vert", "mirror_far.frag"]
-                .map(|file| ShaderPermutation::new(file, 4)),
-        )
-        .collect()
+    let mut rows: Vec<ShaderPermutation> = triangles.collect();
+    rows.extend([false, true].into_iter().flat_map(DrawGrid::rows));
+    rows.extend([false, true].into_iter().flat_map(SunMaps::rows));
+    rows.extend(Receiver::ALL.iter().flat_map(|receiver| LightImages::rows(*receiver)));
+    rows.extend([Step::Coarse, Step::Fine].map(LightImages::select_row));
+    rows.extend(sharp.iter().map(LightImages::evaluate_row));
+    rows.push(Smooth::fragment());
+    rows.extend(
+        ["overlay.vert", "overlay.frag", "show.vert", "show.frag", "sky.frag", "smooth.vert", "mirror_far.frag"]
+            .map(|file| ShaderPermutation::new(file, 4)),
+    );
+    rows
 }
 
 fn measuring() -> Vec<ShaderPermutation> {
@@ -150,6 +146,22 @@ fn measuring() -> Vec<ShaderPermutation> {
         row.define("READS", 16_u32).define("ROUNDS", 16_u32).define("MASK", 1023_u32)
     };
     (0..4).map(rate).collect()
+}
+
+/// The merge of usual scenes.
+fn usual_permutation() -> MergePermutation {
+    MergePermutation {
+        variant: VARIANTS[0],
+        bands: 4,
+        storage: Storage::F16,
+        lattice: Lattice { inner: 1.02, ..Lattice::default() },
+        skip: Skip::ALL,
+        lights: true,
+        sheets: true,
+        volume: false,
+        gloss: false,
+        entity_limit: 48,
+    }
 }
 
 /// A usual permutation, everything that differs from it in one choice, and a few far from it.
@@ -185,19 +197,17 @@ fn assert_served(shader: &Shader) {
     assert!(uniform <= 12 && bindings.len() <= 128, "{}", shader.name);
 }
 
-/// Compiles every row and lets spirv-val judge what comes out, each different row once.
-fn check(rows: Vec<ShaderPermutation>) {
+#[test]
+fn shaders_are_valid_and_every_entry_point_is_among_them() {
     let validator = || Command::new("spirv-val");
     let has_validator = validator().arg("--version").output().is_ok_and(|output| output.status.success());
     if !has_validator {
         skip("spirv-val is not on the path (Debian's package is spirv-tools)");
     }
-    let mut done: Vec<ShaderPermutation> = Vec::new();
-    for row in rows {
-        if done.contains(&row) {
-            continue;
-        }
-        let shader = library().shader(&row).unwrap_or_else(|error| panic!("{row:?}: {error}"));
+    let rows = [merging(), drawing(), sharp(), bouncing(), baking(), measuring()].into_iter().flatten();
+    let rows: HashSet<ShaderPermutation> = rows.collect();
+    rows.par_iter().for_each(|row| {
+        let shader = library().shader(row).unwrap_or_else(|error| panic!("{row:?}: {error}"));
         assert_served(&shader);
         if has_validator {
             let file = tempfile::NamedTempFile::new().unwrap();
@@ -205,42 +215,11 @@ fn check(rows: Vec<ShaderPermutation>) {
             let output = validator().args(["--target-env", "vulkan1.3"]).arg(file.path()).output().unwrap();
             assert!(output.status.success(), "{row:?}: {output:?}");
         }
-        done.push(row);
-    }
-    common::report(&format!("{} rows", done.len()));
-}
-
-#[test]
-fn baking_shaders_are_valid() {
-    check(baking());
-}
-
-#[test]
-fn drawing_shaders_are_valid() {
-    check(drawing());
-    check(bouncing());
-    check(sharp());
-}
-
-#[test]
-fn measuring_shaders_are_valid() {
-    check(measuring());
-}
-
-#[test]
-fn merge_shaders_are_valid() {
-    check(merging());
-}
-
-#[test]
-fn every_entry_point_is_among_the_rows() {
-    let compiled: BTreeSet<&str> = [baking(), drawing(), measuring(), merging(), sharp(), bouncing()]
-        .concat()
-        .iter()
-        .map(|row| row.file)
-        .collect();
+    });
+    let compiled: BTreeSet<&str> = rows.iter().map(|row| row.file).collect();
     let there: BTreeSet<&str> = FILES.iter().map(|(name, _)| *name).filter(|name| !name.ends_with(".glsl")).collect();
     assert_eq!(compiled, there);
+    common::report(&format!("{} rows", rows.len()));
 }
 
 #[test]

@@ -13,11 +13,8 @@ use shadow_fields::asset::{Mesh, embedded};
 use shadow_fields::bake::cache::Cache;
 use shadow_fields::bake::{self, Baker};
 use shadow_fields::farm::{Film, Input, Plan};
-use shadow_fields::field::{Lattice, Storage};
 use shadow_fields::frame::{self, Frame};
 use shadow_fields::gpu::{Device, DeviceOptions, Validation};
-use shadow_fields::lists::skip::Skip;
-use shadow_fields::merge::variant::{MergePermutation, VARIANTS};
 use shadow_fields::scene::{Placement, Scene};
 use shadow_fields::sh::basis::MAX_BANDS;
 use shadow_fields::sh::lobe::zonal;
@@ -263,22 +260,6 @@ pub fn huge_png() -> Vec<u8> {
     png.extend(0x3967_4e07_u32.to_be_bytes());
     png.extend(b"\0\0\0\0IDAT\x35\xaf\x06\x1e\0\0\0\0IEND\xae\x42\x60\x82");
     png
-}
-
-/// The merge of usual scenes.
-pub fn usual_permutation() -> MergePermutation {
-    MergePermutation {
-        variant: VARIANTS[0],
-        bands: 4,
-        storage: Storage::F16,
-        lattice: Lattice { inner: 1.02, ..Lattice::default() },
-        skip: Skip::ALL,
-        lights: true,
-        sheets: true,
-        volume: false,
-        gloss: false,
-        entity_limit: 48,
-    }
 }
 
 /// A plan of two meshes and of two pictures, each a slice.

@@ -5,7 +5,7 @@
 #![cfg(unix)]
 
 use crate::cli::{bare, finish, has_device};
-use crate::common::{Running, names, report};
+use crate::common::{Running, paths_below, report};
 use crate::{model, room};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -110,29 +110,19 @@ impl Good {
             std::thread::sleep(end.saturating_duration_since(Instant::now()));
             cut += usize::from(process.0.try_wait().unwrap().is_none());
         }
-        let places = folders.iter().cloned().chain(["", "fields", "spirv"].map(|name| cache.join(name)));
         for (folder, &job) in folders.iter().zip(&jobs) {
             self.assert_whole(folder, None);
             let ran = finish(&mut program(folder, COMMANDS[job].0));
             assert_eq!(ran.code, 0, "{:?}: {}", COMMANDS[job].0, ran.stderr);
             self.assert_whole(folder, Some(job));
         }
-        for place in places {
-            assert_eq!(unfinished(&place), [""; 0], "{}", place.display());
+        for path in folders.iter().chain([&cache]).flat_map(|folder| paths_below(folder)) {
+            let name = path.file_name().unwrap().to_string_lossy();
+            assert!(!name.starts_with(".unfinished-"), "a killed process left {}", path.display());
         }
         folders.iter().for_each(|folder| std::fs::remove_dir_all(folder).unwrap());
         cut
     }
-}
-
-/// Names of files that a killed process left half-made in a folder or in those within.
-fn unfinished(folder: &Path) -> Vec<String> {
-    let inside = |name: String| {
-        let path = folder.join(&name);
-        if path.is_dir() { names(&path) } else { vec![name] }
-    };
-    let all = if folder.is_dir() { names(folder) } else { Vec::new() };
-    all.into_iter().flat_map(inside).filter(|name| name.starts_with(".unfinished-")).collect()
 }
 
 /// In each round another command is killed for sure.

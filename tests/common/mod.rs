@@ -74,6 +74,19 @@ pub fn names(folder: &Path) -> Vec<String> {
     names
 }
 
+/// Everything in a folder and below, folders too.
+pub fn paths_below(folder: &Path) -> Vec<PathBuf> {
+    let mut out = Vec::new();
+    for entry in std::fs::read_dir(folder).unwrap_or_else(|error| panic!("{}: {error}", folder.display())) {
+        let path = entry.unwrap().path();
+        if path.is_dir() {
+            out.extend(paths_below(&path));
+        }
+        out.push(path);
+    }
+    out
+}
+
 /// A program that is ended with the test.
 pub struct Running(pub Child);
 

@@ -1,12 +1,12 @@
 //! Runs something again and again, and lets one Vulkan call after another fail.
 
 use super::claimed::Claims;
-use super::common::report;
+use super::common::{paths_below, report};
 use super::layer::{Call, Heard, Plan, watch};
 use ash::vk;
 use shadow_fields::{Error, Result};
 use std::panic::{AssertUnwindSafe, catch_unwind};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::sync::mpsc::{RecvTimeoutError, channel};
 use std::time::{Duration, Instant};
 
@@ -177,15 +177,8 @@ fn assert_told(what: &str, call: Call, code: vk::Result, error: &Error) {
 
 /// No half-written file in the folder or below.
 fn assert_no_leftovers(what: &str, folder: &Path) {
-    let mut folders = vec![folder.to_owned()];
-    while let Some(folder) = folders.pop() {
-        for entry in std::fs::read_dir(&folder).unwrap() {
-            let path: PathBuf = entry.unwrap().path();
-            let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
-            assert!(!name.starts_with(".unfinished-"), "{what}: {} is left", path.display());
-            if path.is_dir() {
-                folders.push(path);
-            }
-        }
+    for path in paths_below(folder) {
+        let name = path.file_name().unwrap_or_default().to_string_lossy();
+        assert!(!name.starts_with(".unfinished-"), "{what}: {} is left", path.display());
     }
 }

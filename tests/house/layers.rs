@@ -1,5 +1,6 @@
 //! The shape of the source tree: which module may use which.
 
+use crate::common::paths_below;
 use crate::root;
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
@@ -19,22 +20,11 @@ fn order() -> Vec<String> {
 /// The only modules that `gpu` may use: it knows nothing of what it is for.
 const GPU_USES: &[&str] = &["error", "files"];
 
-/// All files of Rust.
-fn files() -> Vec<PathBuf> {
-    let mut out = Vec::new();
-    let mut folders = vec![root().join("src")];
-    while let Some(folder) = folders.pop() {
-        for entry in std::fs::read_dir(&folder).unwrap_or_else(|error| panic!("{}: {error}", folder.display())) {
-            let path = entry.unwrap().path();
-            if path.is_dir() {
-                folders.push(path);
-            } else if path.extension().is_some_and(|ending| ending == "rs") {
-                out.push(path.strip_prefix(root()).unwrap().to_path_buf());
-            }
-        }
-    }
-    out.sort();
-    out
+/// All files of Rust below `src/`.
+fn files() -> impl Iterator<Item = PathBuf> {
+    let paths = paths_below(&root().join("src")).into_iter();
+    let rust = paths.filter(|path| path.extension().is_some_and(|ending| ending == "rs"));
+    rust.map(|path| path.strip_prefix(root()).unwrap().to_path_buf())
 }
 
 fn text(path: &Path) -> String {
@@ -55,18 +45,13 @@ fn is_word(c: char) -> bool {
 }
 
 /// Names right behind `prefix`.
-fn names_after(code: &str, prefix: &str) -> BTreeSet<String> {
-    let mut names = BTreeSet::new();
-    for (at, _) in code.match_indices(prefix) {
-        if code[..at].chars().next_back().is_some_and(|c| is_word(c) || c == ':') {
-            continue;
-        }
+fn names_after<'c>(code: &'c str, prefix: &'c str) -> impl Iterator<Item = &'c str> {
+    let is_whole = |(at, _): &(usize, &str)| !code[..*at].ends_with(|c: char| is_word(c) || c == ':');
+    code.match_indices(prefix).filter(is_whole).map(move |(at, _)| {
         let rest = &code[at + prefix.len()..];
         assert!(!rest.starts_with('{'), "{prefix}{}: modules are used one a line", rest.lines().next().unwrap_or(""));
-        names.insert(rest.chars().take_while(|c| is_word(*c)).collect());
-    }
-    names.remove("");
-    names
+        rest.split(|c: char| !is_word(c)).next().unwrap_or("")
+    })
 }
 
 /// The module below `src/` that a file belongs to, and how many `super` lead from it to the crate.
@@ -88,25 +73,15 @@ fn modules_use_only_what_stands_above_them() {
             continue;
         }
         let own_place = place(&own).unwrap_or_else(|| panic!("{}: no layer", path.display()));
-        seen.insert(own.clone());
         let code = code(&text(&path));
-        let mut used = names_after(&code, "crate::");
-        let up = names_after(&code, &"super::".repeat(depth));
-        used.extend(up);
-        if own == "main" {
-            continue;
-        }
-        for name in used.iter().filter(|name| **name != own) {
+        let up = "super::".repeat(depth);
+        for name in names_after(&code, "crate::").chain(names_after(&code, &up)).filter(|name| *name != own) {
             let Some(other) = place(name) else { continue };
             assert!(other < own_place, "{} uses crate::{name}, which stands below {own}", path.display());
-            assert!(
-                own != "gpu" || GPU_USES.contains(&name.as_str()),
-                "{} uses crate::{name}: gpu knows nothing of it",
-                path.display()
-            );
+            let is_known = own != "gpu" || GPU_USES.contains(&name);
+            assert!(is_known, "{} uses crate::{name}: gpu knows nothing of it", path.display());
         }
+        seen.insert(own);
     }
-    for needed in ["sh", "gpu", "field", "bake", "shaders"] {
-        assert!(seen.contains(needed), "no file of {needed} was read");
-    }
+    assert_eq!(seen.len(), order.len(), "only files of these modules were read: {seen:?}");
 }

@@ -1,5 +1,7 @@
 //! The source tree, its pages and scripts.
 
+#[path = "../common/mod.rs"]
+mod common;
 mod expect;
 mod features;
 mod layers;

@@ -12,6 +12,11 @@ use shadow_fields::asset::Mesh;
 use shadow_fields::scene::{Scene, gltf};
 use std::path::{Path, PathBuf};
 
+/// Sine and cosine of 45 degrees: what quaternions of a quarter turn have.
+pub const QUARTER: f32 = std::f32::consts::FRAC_1_SQRT_2;
+/// Keys of half a turn about +y.
+const TURN: [f32; 12] = [0., 0., 0., 1., 0., QUARTER, 0., QUARTER, 0., 1., 0., 0.];
+
 /// Component types of accessors.
 pub const I8: u32 = 5120;
 pub const U8: u32 = 5121;
@@ -33,15 +38,20 @@ impl Default for Model {
     }
 }
 
+/// Adds an element to a list, which may not be there yet, and returns its index.
+fn push(list: &mut Value, value: Value) -> usize {
+    if list.is_null() {
+        *list = json!([]);
+    }
+    let list = list.as_array_mut().unwrap();
+    list.push(value);
+    list.len() - 1
+}
+
 impl Model {
     /// Adds an element to a list at the top and returns its index.
     pub fn push(&mut self, list: &str, value: Value) -> usize {
-        if self.json[list].is_null() {
-            self.json[list] = json!([]);
-        }
-        let list = self.json[list].as_array_mut().unwrap();
-        list.push(value);
-        list.len() - 1
+        push(&mut self.json[list], value)
     }
 
     /// A buffer view of these bytes.
@@ -95,20 +105,24 @@ impl Model {
         self.push("meshes", json!({ "primitives": [primitive] }))
     }
 
+    /// The same, and a node that has nothing else.
+    pub fn placed(&mut self, attributes: Value, indices: Option<usize>, material: Option<usize>) -> usize {
+        let mesh = self.mesh(attributes, indices, material);
+        self.node(json!({ "mesh": mesh }));
+        mesh
+    }
+
     /// A node that stands in no other.
     pub fn node(&mut self, node: Value) -> usize {
         let index = self.push("nodes", node);
-        self.json["scenes"][0]["nodes"].as_array_mut().unwrap().push(json!(index));
+        push(&mut self.json["scenes"][0]["nodes"], json!(index));
         index
     }
 
     /// A node that stands in another.
     pub fn child(&mut self, of: usize, node: Value) -> usize {
         let index = self.push("nodes", node);
-        if self.json["nodes"][of]["children"].is_null() {
-            self.json["nodes"][of]["children"] = json!([]);
-        }
-        self.json["nodes"][of]["children"].as_array_mut().unwrap().push(json!(index));
+        push(&mut self.json["nodes"][of]["children"], json!(index));
         index
     }
 
@@ -140,22 +154,16 @@ impl Model {
             self.push("animations", json!({ "channels": [], "samplers": [] }));
         }
         let json = &mut self.json["animations"][animation];
-        let samplers = json["samplers"].as_array_mut().unwrap();
-        samplers.push(json!({ "input": input, "output": output, "interpolation": how }));
-        let sampler = samplers.len() - 1;
-        let channel = json!({ "sampler": sampler, "target": { "node": node, "path": path } });
-        json["channels"].as_array_mut().unwrap().push(channel);
+        let sampler = json!({ "input": input, "output": output, "interpolation": how });
+        let sampler = push(&mut json["samplers"], sampler);
+        push(&mut json["channels"], json!({ "sampler": sampler, "target": { "node": node, "path": path } }));
     }
 
     /// Adds a light and returns the extensions of a node that holds it.
     pub fn light(&mut self, light: Value) -> Value {
-        if self.json["extensions"].is_null() {
-            self.json["extensionsUsed"] = json!(["KHR_lights_punctual"]);
-            self.json["extensions"] = json!({ "KHR_lights_punctual": { "lights": [] } });
-        }
-        let lights = self.json["extensions"]["KHR_lights_punctual"]["lights"].as_array_mut().unwrap();
-        lights.push(light);
-        json!({ "KHR_lights_punctual": { "light": lights.len() - 1 } })
+        self.json["extensionsUsed"] = json!(["KHR_lights_punctual"]);
+        let index = push(&mut self.json["extensions"]["KHR_lights_punctual"]["lights"], light);
+        json!({ "KHR_lights_punctual": { "light": index } })
     }
 
     /// A texture of a picture's bytes.
@@ -249,8 +257,7 @@ pub fn room() -> Model {
     model.node(json!({ "name": "floor", "mesh": mesh }));
     let mesh = model.cuboid([-0.4; 3], [0.4; 3], Some(body));
     let box_ = model.node(json!({ "name": "box", "mesh": mesh, "translation": [0, 0.8, 0], "scale": [1, 1.6, 1] }));
-    let half = std::f32::consts::FRAC_1_SQRT_2;
-    model.animate(0, box_, "rotation", "LINEAR", &[0., 1., 2.], &[0., 0., 0., 1., 0., half, 0., half, 0., 1., 0., 0.]);
+    model.animate(0, box_, "rotation", "LINEAR", &[0., 1., 2.], &TURN);
     let mesh = model.cuboid([-0.1; 3], [0.1; 3], Some(glow));
     model.node(json!({ "name": "ember", "mesh": mesh, "translation": [1.2, 0.6, 0.8] }));
     let lamp = model.light(json!({ "type": "point", "color": [0.6, 0.8, 1], "intensity": 20 }));
@@ -279,14 +286,12 @@ pub fn bench(material: Value) -> Model {
 /// Three parts that move, one in another, and two lamps.
 pub fn robot() -> Model {
     let mut model = Model::default();
-    let half = std::f32::consts::FRAC_1_SQRT_2;
-    let turn = [0., 0., 0., 1., 0., half, 0., half, 0., 1., 0., 0.];
     let mut outer = None;
     for (name, size) in [("body", 0.5), ("arm", 0.3), ("hand", 0.1)] {
         let mesh = model.cuboid([-size; 3], [size; 3], None);
         let node = json!({ "name": name, "mesh": mesh, "translation": [0, 1, 0.5] });
         let node = if let Some(outer) = outer { model.child(outer, node) } else { model.node(node) };
-        model.animate(0, node, "rotation", "LINEAR", &[0., 1., 2.], &turn);
+        model.animate(0, node, "rotation", "LINEAR", &[0., 1., 2.], &TURN);
         outer = Some(node);
     }
     for x in [-2, 2] {

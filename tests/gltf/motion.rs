@@ -1,13 +1,13 @@
 //! Animations of glTF models as motion of nodes, against the specification's formulas, and that motion as a scene file
 //! has it.
 
-use crate::model::{Model, load, near};
+use crate::model::{Model, QUARTER, load, near};
 use glam::{DMat4, DQuat, DVec3, Vec3};
 use serde_json::json;
 use shadow_fields::scene::keys::{Between, Keys};
 use shadow_fields::scene::motion::{Motion, Node};
 use shadow_fields::scene::{Data, gltf};
-use std::f32::consts::{FRAC_1_SQRT_2, PI};
+use std::f32::consts::PI;
 use std::path::Path;
 
 /// Where a point of an entity's space is at a time.
@@ -75,7 +75,7 @@ fn rotations_take_the_short_way_and_scales_grow() {
     let mut model = Model::default();
     let node = cube(&mut model, json!({ "rotation": [0, 0, 0, 1] }));
     // A quarter about +z, its second key with the other sign.
-    let quarter = [0.0, 0.0, 0.0, 1.0, 0.0, 0.0, -FRAC_1_SQRT_2, -FRAC_1_SQRT_2];
+    let quarter = [0.0, 0.0, 0.0, 1.0, 0.0, 0.0, -QUARTER, -QUARTER];
     model.animate(0, node, "rotation", "LINEAR", &[0.0, 2.0], &quarter);
     model.animate(0, node, "scale", "LINEAR", &[0.0, 4.0], &[1.0, 1.0, 1.0, 3.0, 3.0, 3.0]);
     let import = load(&model);
@@ -92,7 +92,7 @@ fn rotations_take_the_short_way_and_scales_grow() {
 fn pair() -> Model {
     let mut model = Model::default();
     let body = cube(&mut model, json!({ "name": "body", "translation": [1, 0, 0], "scale": [2, 2, 2] }));
-    let arm = model.child(body, json!({ "translation": [3, 0, 0], "rotation": [0, 0, FRAC_1_SQRT_2, FRAC_1_SQRT_2] }));
+    let arm = model.child(body, json!({ "translation": [3, 0, 0], "rotation": [0, 0, QUARTER, QUARTER] }));
     let mesh = model.cuboid([-0.2; 3], [0.2; 3], None);
     let moon = model.child(arm, json!({ "name": "moon", "mesh": mesh, "translation": [0, 0.5, 0] }));
     let turn = |axis: Vec3| -> Vec<f32> {

@@ -6,7 +6,7 @@ use glam::{Mat3, Quat, Vec2, Vec3};
 use serde_json::json;
 use shadow_fields::asset::Mesh;
 use shadow_fields::scene::gltf::{self, Import};
-use shadow_fields::scene::{LightMethod, Lights, Scene};
+use shadow_fields::scene::{Entity, LightMethod, Lights, Scene};
 use std::f32::consts::TAU;
 use std::sync::Arc;
 
@@ -18,26 +18,26 @@ fn load(model: &Model) -> (Import, Scene) {
     let text = toml::to_string(&import.data).unwrap();
     let file = folder.path().join("m.toml");
     std::fs::write(&file, text).unwrap();
-    (import, Scene::load(&file).unwrap())
+    let scene = Scene::load(&file).unwrap();
+    for (here, there) in import.meshes.iter().zip(&scene.meshes) {
+        assert_eq!(here.content_hash(), there.content_hash());
+    }
+    (import, scene)
 }
 
-/// Names of entities but for the sun that is added.
-fn benches(scene: &Scene) -> Vec<&str> {
-    let names = scene.entities.iter().map(|entity| entity.name.as_str());
-    names.filter(|name| name.starts_with("bench")).collect()
+/// Entities of the node with that name, which leaves out the sun that is added.
+fn of<'s>(scene: &'s Scene, node: &str) -> Vec<&'s Entity> {
+    scene.entities.iter().filter(|entity| entity.name.starts_with(node)).collect()
 }
 
 #[test]
 fn loose_pieces_become_entities() {
-    let (import, scene) = load(&bench(json!({})));
-    let names = benches(&scene);
+    let (_, scene) = load(&bench(json!({})));
+    let names: Vec<_> = of(&scene, "bench").iter().map(|entity| entity.name.as_str()).collect();
     assert_eq!(names, ["bench, piece 0", "bench, piece 1", "bench, piece 2", "bench, piece 3"]);
     let counts: Vec<_> = scene.meshes[..4].iter().map(|mesh| mesh.triangles.len()).collect();
     assert_eq!(counts, [12, 12, 12, 3], "three boxes, and the specks together");
     assert!(scene.meshes[..3].iter().all(|mesh| mesh.is_convex()));
-    for (here, there) in import.meshes.iter().zip(&scene.meshes) {
-        assert_eq!(here.content_hash(), there.content_hash());
-    }
 }
 
 /// Boxes that share a face, an edge or a corner are pieces, whether the face is there twice or lies within.
@@ -49,8 +49,7 @@ fn boxes_that_touch_are_pieces() {
     let mesh = model.shape(&joined(&places.map(|place| (&cube, place))), None);
     model.node(json!({ "mesh": mesh, "name": "boxes" }));
     let (_, scene) = load(&model);
-    let boxes = scene.entities.iter().filter(|entity| entity.name.starts_with("boxes"));
-    let meshes: Vec<_> = boxes.map(|entity| &scene.meshes[entity.mesh]).collect();
+    let meshes: Vec<_> = of(&scene, "boxes").iter().map(|entity| &scene.meshes[entity.mesh]).collect();
     assert_eq!(meshes.len(), 4);
     assert!(meshes.iter().all(|mesh| mesh.triangles.len() == 12 && mesh.is_convex()));
 }
@@ -58,7 +57,9 @@ fn boxes_that_touch_are_pieces() {
 #[test]
 fn what_lets_light_through_stays_whole() {
     let glass = json!({ "alphaMode": "BLEND", "pbrMetallicRoughness": { "baseColorFactor": [1, 1, 1, 0.3] } });
-    assert_eq!(benches(&load(&bench(glass)).1), ["bench"]);
+    let (_, scene) = load(&bench(glass));
+    let [entity] = of(&scene, "bench")[..] else { panic!("{:?}", scene.entities) };
+    assert_eq!(entity.name, "bench");
 }
 
 /// The meshes of a file whose one primitive is of that material.
@@ -67,12 +68,8 @@ fn meshes(parts: &[(&Mesh, Vec3)], material: serde_json::Value) -> Vec<Arc<Mesh>
     let material = model.push("materials", material);
     let mesh = model.shape(&joined(parts), Some(material));
     model.node(json!({ "mesh": mesh, "name": "one" }));
-    let (import, scene) = load(&model);
-    for (here, there) in import.meshes.iter().zip(&scene.meshes) {
-        assert_eq!(here.content_hash(), there.content_hash());
-    }
-    let found = scene.entities.iter().filter(|entity| entity.name.starts_with("one"));
-    found.map(|entity| scene.meshes[entity.mesh].clone()).collect()
+    let (_, scene) = load(&model);
+    of(&scene, "one").iter().map(|entity| scene.meshes[entity.mesh].clone()).collect()
 }
 
 /// Bulbs that stand apart are lamps, up to 32; of more, neighbours are one. What touches is one lamp, and a ring of neon
@@ -148,7 +145,7 @@ fn concave_solids_that_move_stay_together() {
     let mut model = Model::default();
     let mesh = model.shape(&joined(&[(&ring, Vec3::ZERO), (&ring, 3.0 * Vec3::X)]), None);
     let node = model.node(json!({ "mesh": mesh, "name": "rings" }));
-    let count = |model: &Model| load(model).1.entities.iter().filter(|entity| entity.name.starts_with("rings")).count();
+    let count = |model: &Model| of(&load(model).1, "rings").len();
     assert_eq!(count(&model), 2);
     model.animate(0, node, "translation", "LINEAR", &[0.0, 1.0], &[0.0, 0.0, 0.0, 1.0, 0.0, 0.0]);
     assert_eq!(count(&model), 1);
@@ -159,7 +156,7 @@ fn pieces_move_with_their_node() {
     let mut model = bench(json!({}));
     model.animate(0, 0, "translation", "LINEAR", &[0.0, 1.0], &[0.0, 0.0, 0.0, 1.0, 0.0, 0.0]);
     let (_, scene) = load(&model);
-    assert_eq!(benches(&scene).len(), 4);
+    assert_eq!(of(&scene, "bench").len(), 4);
     let before = scene.at(0.0);
     let after = scene.at(0.5);
     let pieces = scene.entities.iter().zip(before.iter().zip(&after)).filter(|(e, _)| e.name.starts_with("bench"));
@@ -247,9 +244,6 @@ fn many_nodes_are_joined() {
     let vertices: Vec<Vec3> = joined().flat_map(|entity| scene.meshes[entity.mesh].positions.clone()).collect();
     for i in (0..4400).step_by(97) {
         assert!(vertices.iter().any(|vertex| vertex.distance(place(i)) < 1e-4), "node {i}");
-    }
-    for (here, there) in import.meshes.iter().zip(&scene.meshes) {
-        assert_eq!(here.content_hash(), there.content_hash());
     }
     assert!(import.notes.left_out().is_empty(), "{:?}", import.notes.left_out());
 }

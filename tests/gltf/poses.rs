@@ -1,6 +1,6 @@
 //! Skins, morph targets, instances and named cameras of models that the tests make.
 
-use crate::model::{Model, U8, load, read, refusal, world};
+use crate::model::{Model, QUARTER, U8, load, read, refusal, world};
 use glam::{DQuat, DVec3, Vec3};
 use serde_json::{Value, json};
 use shadow_fields::scene::{Scene, gltf};
@@ -45,9 +45,9 @@ fn arm() -> (Model, usize) {
 fn vertices_follow_their_joints() {
     let (mut model, elbow) = arm();
     assert_near(&posed(&model, 0.0).0, &[[0., 0., 5.], [1., 0., 5.], [2., 0.1, 5.]]);
-    let half = std::f32::consts::FRAC_1_SQRT_2;
     // The elbow turns by 90 degrees about z within a second.
-    model.animate(0, elbow, "rotation", "LINEAR", &[0., 1., 2.], &[0., 0., 0., 1., 0., 0., half, half, 0., 0., 0., 1.]);
+    let turn = [0., 0., 0., 1., 0., 0., QUARTER, QUARTER, 0., 0., 0., 1.];
+    model.animate(0, elbow, "rotation", "LINEAR", &[0., 1., 2.], &turn);
     let (points, import) = posed(&model, 1.0);
     assert_near(&points, &[[0., 0., 5.], [1., 0., 5.], [0.9, 1., 5.]]);
     let said = [import.notes.left_out(), import.notes.said().to_vec()].concat().join("\n");
@@ -112,9 +112,8 @@ fn morph_targets_move_vertices_by_their_shares() {
 fn instances_stand_where_their_attributes_say() {
     let mut model = Model::default();
     let cube = model.cuboid([-0.5; 3], [0.5; 3], None);
-    let half = std::f32::consts::FRAC_1_SQRT_2;
     let positions = model.floats(3, &[0., 0., 0., 2., 0., 0., 4., 0., 0.]);
-    let rotations = model.floats(4, &[0., 0., 0., 1., 0., half, 0., half, 0., 0., 0., 1.]);
+    let rotations = model.floats(4, &[0., 0., 0., 1., 0., QUARTER, 0., QUARTER, 0., 0., 0., 1.]);
     let scales = model.floats(3, &[1., 1., 1., 2., 2., 2., 1., 3., 1.]);
     let attributes = json!({ "TRANSLATION": positions, "ROTATION": rotations, "SCALE": scales });
     let extensions = json!({ "EXT_mesh_gpu_instancing": { "attributes": attributes } });

@@ -104,8 +104,7 @@ fn indices_out_of_range() {
     let mut model = Model::default();
     let positions = model.positions(&[0., 0., 0., 1., 0., 0., 0., 1., 0.]);
     let indices = model.indices(&[0, 1, 3]);
-    let mesh = model.mesh(json!({ "POSITION": positions }), Some(indices), None);
-    model.node(json!({ "mesh": mesh }));
+    model.placed(json!({ "POSITION": positions }), Some(indices), None);
     refused_model(&model, &["index 3 is out of range: there are 3", "meshes[0].primitives[0]"]);
 }
 
@@ -115,8 +114,7 @@ fn numbers_out_of_range() {
         let mut model = Model::default();
         let positions = model.positions(&[0., 0., 0., 1., 0., 0., 0., 1., 0.]);
         model.bytes[16..20].copy_from_slice(&bad.to_le_bytes());
-        let mesh = model.mesh(json!({ "POSITION": positions }), None, None);
-        model.node(json!({ "mesh": mesh }));
+        model.placed(json!({ "POSITION": positions }), None, None);
         refused_model(&model, &["accessors[0]: a number of element 1 is not finite"]);
     }
     refused_values(&[
@@ -236,8 +234,7 @@ fn bombs() {
     let bounds = json!([0, 0, 0]);
     let json = json!({ "componentType": F32, "count": 4_000_000_000_u64, "type": "VEC3", "sparse": sparse, "min": bounds, "max": bounds });
     let positions = model.push("accessors", json);
-    let mesh = model.mesh(json!({ "POSITION": positions }), None, None);
-    model.node(json!({ "mesh": mesh }));
+    let mesh = model.placed(json!({ "POSITION": positions }), None, None);
     refused_model(&model, &["accessors[0]: a count of 4000000000"]);
     // The same, within the limit but used by many.
     model.json["accessors"][positions]["count"] = json!(3_000_000);

@@ -3,7 +3,7 @@
 use crate::common::generate;
 use crate::model;
 use glam::{DMat4, DQuat, DVec3, Quat, Vec3};
-use model::{F32, I8, I16, Model, U8, U16, U32, corners, cuboid, load, near, world};
+use model::{F32, I8, I16, Model, QUARTER, U8, U16, U32, corners, cuboid, load, near, world};
 use serde_json::json;
 use shadow_fields::scene::{Surroundings, gltf};
 use shadow_fields::truth::RayCast;
@@ -195,8 +195,7 @@ fn quantised_accessors_are_numbers() {
     let unsigned = model.accessor(U16, 3, 3, &bytes);
     model.json["accessors"][unsigned]["normalized"] = json!(true);
     for positions in [share, whole, unsigned] {
-        let mesh = model.mesh(json!({ "POSITION": positions, "NORMAL": normals }), None, None);
-        model.node(json!({ "mesh": mesh }));
+        model.placed(json!({ "POSITION": positions, "NORMAL": normals }), None, None);
     }
     let import = load(&model);
     let x = 16384.0 / 32767.0;
@@ -222,8 +221,7 @@ fn sparse_accessors_replace_elements() {
         let over_zeros = json!({ "componentType": F32, "count": 3, "type": "VEC3", "sparse": sparse });
         for accessor in [with_base, over_zeros] {
             let positions = model.push("accessors", accessor);
-            let mesh = model.mesh(json!({ "POSITION": positions }), None, None);
-            model.node(json!({ "mesh": mesh }));
+            model.placed(json!({ "POSITION": positions }), None, None);
         }
     }
     let meshes = &load(&model).meshes;
@@ -260,8 +258,7 @@ fn lights_are_balls_of_their_intensity() {
     let point = model.light(json!({ "type": "point", "color": [1, 0.5, 0], "intensity": 12 }));
     let sun = model.light(json!({ "type": "directional", "intensity": 3, "color": [1, 0.5, 0] }));
     let dark = model.light(json!({ "type": "point", "intensity": 0 }));
-    let half = std::f32::consts::FRAC_1_SQRT_2;
-    model.node(json!({ "name": "sun", "rotation": [-half, 0, 0, half], "extensions": sun }));
+    model.node(json!({ "name": "sun", "rotation": [-QUARTER, 0, 0, QUARTER], "extensions": sun }));
     for (light, name) in [(point, "lamp at"), (sun, "second sun"), (dark, "dark")] {
         model.node(json!({ "name": name, "translation": [1, 4, 2], "scale": [3, 3, 3], "extensions": light }));
     }
@@ -305,9 +302,11 @@ fn spots_shine_within_their_cone() {
     model.node(json!({ "name": "floor", "mesh": mesh }));
     let spot = json!({ "innerConeAngle": 0.3, "outerConeAngle": 0.6 });
     let light = model.light(json!({ "type": "spot", "intensity": 10, "color": [1, 0.5, 0.25], "spot": spot }));
-    let half = std::f32::consts::FRAC_1_SQRT_2;
     let outer = model.node(json!({ "scale": [2, 2, 2], "translation": [0, 1, 0] }));
-    model.child(outer, json!({ "translation": [0, 0.5, 0], "rotation": [-half, 0, 0, half], "extensions": light }));
+    model.child(
+        outer,
+        json!({ "translation": [0, 0.5, 0], "rotation": [-QUARTER, 0, 0, QUARTER], "extensions": light }),
+    );
     let (mut scene, notes) = model::scene(&model);
     scene.surround(&Surroundings::None).unwrap();
     assert_eq!(notes.left_out(), [""; 0]);
@@ -343,9 +342,8 @@ fn the_first_perspective_camera_is_taken() {
     let flat = model.push("cameras", flat);
     let view = model.push("cameras", view);
     model.node(json!({ "camera": flat }));
-    let half = std::f32::consts::FRAC_1_SQRT_2;
     // Turned by a quarter about +y, -z becomes -x.
-    model.node(json!({ "camera": view, "translation": [9, 1, 0], "rotation": [0, half, 0, half] }));
+    model.node(json!({ "camera": view, "translation": [9, 1, 0], "rotation": [0, QUARTER, 0, QUARTER] }));
     model.node(json!({ "camera": view }));
     let import = load(&model);
     let camera = &import.data.camera;

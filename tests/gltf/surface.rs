@@ -242,8 +242,7 @@ fn what_is_not_flat_glows_as_its_picture_does_on_average() {
     let positions = model.positions(&[-1., 0., 0., 0., 0., 0., 1., 0., -1., -1., 1., 0., 0., 1., 0., 1., 1., -1.]);
     let uvs = model.floats(2, &[0., 1., 0.5, 1., 1., 1., 0., 0., 0.5, 0., 1., 0.]);
     let indices = model.indices(&[0, 1, 4, 0, 4, 3, 1, 2, 5, 1, 5, 4]);
-    let mesh = model.mesh(json!({ "POSITION": positions, "TEXCOORD_0": uvs }), Some(indices), Some(material));
-    model.node(json!({ "mesh": mesh }));
+    model.placed(json!({ "POSITION": positions, "TEXCOORD_0": uvs }), Some(indices), Some(material));
     let (scene, _) = model::scene(&model);
     let mesh = &scene.meshes[0];
     let colors = mesh.colors.as_ref().unwrap();
@@ -260,8 +259,7 @@ fn colours_of_vertices_tint_a_surface() {
     let colors =
         model.accessor(U8, 4, 6, &[[0, 0, 0, 255]; 3].into_iter().chain([[255; 4]; 3]).flatten().collect::<Vec<u8>>());
     model.json["accessors"][colors]["normalized"] = json!(true);
-    let mesh = model.mesh(json!({ "POSITION": positions, "COLOR_0": colors }), None, None);
-    model.node(json!({ "mesh": mesh }));
+    model.placed(json!({ "POSITION": positions, "COLOR_0": colors }), None, None);
     let (scene, _) = model::scene(&model);
     assert!((scene.entities[0].albedo - Vec3::splat(0.25)).length() < 1e-6, "the mean by area");
     let tints = scene.meshes[0].tints.as_ref().unwrap();
@@ -277,8 +275,7 @@ fn alphas_of_vertices_blend_a_surface() {
     for mode in ["BLEND", "OPAQUE"] {
         let color = json!({ "baseColorFactor": [1, 1, 1, 0.5] });
         let material = model.push("materials", json!({ "alphaMode": mode, "pbrMetallicRoughness": color }));
-        let mesh = model.mesh(json!({ "POSITION": positions, "COLOR_0": colors }), None, Some(material));
-        model.node(json!({ "mesh": mesh }));
+        model.placed(json!({ "POSITION": positions, "COLOR_0": colors }), None, Some(material));
     }
     let (scene, _) = model::scene(&model);
     assert!((scene.entities[0].opacity - 0.2).abs() < 1e-6, "{}", scene.entities[0].opacity);

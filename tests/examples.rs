@@ -16,8 +16,7 @@ fn read(path: impl AsRef<Path>) -> String {
     std::fs::read_to_string(&path).unwrap_or_else(|error| panic!("{}: {error}", path.display()))
 }
 
-/// The folder that everything is compiled into, so that what the library's own tests have compiled is not compiled
-/// again.
+/// The folder that the library's own tests compile into, so that nothing is compiled again.
 fn target() -> &'static Path {
     Path::new(env!("CARGO_TARGET_TMPDIR")).parent().unwrap()
 }

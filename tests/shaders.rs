@@ -187,8 +187,7 @@ fn merging() -> Vec<ShaderPermutation> {
     permutations.iter().map(MergePermutation::row).collect()
 }
 
-/// Asserts that a shader asks for no more than every device of Vulkan 1.3 has. Storage buffers and sampled images are
-/// compared with each device's own numbers.
+/// Asserts that a shader asks for no more than all devices of Vulkan 1.3 have, but for storage buffers and images.
 fn assert_served(shader: &Shader) {
     let Reflection { push_bytes, shared_bytes, local_size, bindings, .. } = &shader.reflection;
     let invocations: u32 = local_size.iter().product();

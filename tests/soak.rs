@@ -1,5 +1,4 @@
-//! Thousands of frames of a small moving scene whose entities change: whether memory grows, pictures drift or frames
-//! slow.
+//! Thousands of frames of a small scene that moves and changes: memory, pictures and speed stay as they are.
 
 mod common;
 

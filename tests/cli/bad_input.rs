@@ -1,5 +1,4 @@
-//! Bad input and usage through the program: one clear line on stderr that names the file (and the line) or the option,
-//! the exit code that README lists, and nothing left behind.
+//! Bad input and usage: one line that names the file and line or the option, the exit code of README, no files left.
 
 use crate::cli::{Folder, TRIANGLE, finish, has_device, without_drivers};
 use std::time::{Duration, Instant};

@@ -1,5 +1,4 @@
-//! Names, numbers and surroundings that nobody means well: the program neither panics nor passes them to the terminal,
-//! and ends with the exit code that the reason has.
+//! Names, numbers and surroundings that nobody means well: no panic, nothing raw on the terminal, the right exit code.
 #![cfg(unix)]
 
 use crate::cli::{COARSE, Folder, TRIANGLE, finish, has_device, limited, without_drivers};

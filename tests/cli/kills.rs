@@ -14,9 +14,7 @@ use std::time::{Duration, Instant};
 
 const MESH: &str = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 1 4 3\n";
 
-/// Every kind of command that writes, and what it writes. Those whose files hold times, `bench` and `profile`, write
-/// them likewise; `farm` has tests of its own. What the first one writes is an input of
-/// others.
+/// Every kind of command that writes, and what it writes, but for `bench`, `profile` and `farm`. Others read the first.
 const COMMANDS: [(&str, &[&str]); 6] = [
     ("bake m.obj -o f.sf --lattice cube:3x3 --face-px 8", &["f.sf"]),
     (
@@ -86,8 +84,7 @@ impl Good {
         }
     }
 
-    /// Kills `crowd` processes at random times, the first of which does `job`, and then runs each to its end. How many
-    /// ran when they were killed.
+    /// Kills `crowd` processes at random times, the first with `job`, then runs each to its end. How many were cut off.
     fn kill(&self, random: &mut fastrand::Rng, crowd: usize, job: usize) -> usize {
         let folders: Vec<_> = (0..crowd).map(|i| place(&self.inside, &format!("crowd-{i}"))).collect();
         let jobs: Vec<_> = (0..crowd).map(|i| if i == 0 { job } else { random.usize(0..COMMANDS.len()) }).collect();

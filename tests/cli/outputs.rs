@@ -1,5 +1,4 @@
-//! No output replaces an input or another output, what cannot be written is found at the start, and pipes are not
-//! waited for.
+//! No output replaces a file that is read or written; bad outputs are found at the start, pipes are not waited for.
 #![cfg(unix)]
 
 use crate::cli::{Folder, Ran, SMALL, TRIANGLE, finish, has_device, limited, without_drivers};

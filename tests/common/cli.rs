@@ -164,8 +164,7 @@ impl Folder {
         self.names().into_iter().map(|name| (name.clone(), about(&name))).collect()
     }
 
-    /// The command ends with `code` and, besides notes, one line with every one of `parts`; no file comes, goes or
-    /// changes.
+    /// The command ends with `code` and one line, notes aside, that has all `parts`; no file comes, goes or changes.
     pub fn refuses(&self, command: &mut Command, code: i32, parts: &[&str]) {
         let before = self.state();
         let ran = finish(command);

@@ -112,8 +112,7 @@ pub fn open() -> shadow_fields::Result<Arc<Device>> {
     Device::new(&DeviceOptions { device: None, validation: Validation::Sync, cache_dir: Some(cache_dir()) })
 }
 
-/// The device of this test binary, held by one test. At the end it fails the test if the validation layer said
-/// anything.
+/// The device of this test binary, held by one test, which fails at the end if the validation layer said anything.
 pub struct Gpu {
     pub device: Arc<Device>,
     pub library: Library,

@@ -1,5 +1,4 @@
-//! Makes glTF models for tests: JSON with accessors into one buffer, written as GLB, or as JSON with a buffer beside it
-//! or within.
+//! Makes glTF models: JSON with accessors into one buffer, as GLB or as JSON with the buffer within or beside it.
 
 #![allow(dead_code)] // every test binary uses its own part
 

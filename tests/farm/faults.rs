@@ -1,5 +1,4 @@
-//! What goes wrong on machines: kills, damage, folders that cannot be written. Nothing is lost then, and nothing is
-//! wrong.
+//! What goes wrong on machines: kills, damage, folders that cannot be written. Nothing is lost or wrong then.
 
 use super::{Farm, MESHES, cli, common, finish, processes, whole};
 use serde_json::{Value, json};
@@ -39,8 +38,7 @@ fn damaged_results_and_slices_that_run_twice_at_once_end_well() {
     assert!(farm.collected() == whole().files);
 }
 
-/// A cache that cannot be written is no error of a bake, but here it is the result: the slice fails with one line, and
-/// leaves nothing half-written.
+/// A cache that cannot be written is no error of a bake, but here it is the result; nothing is left half-written.
 #[test]
 fn a_slice_that_cannot_be_written_fails() {
     let Some(farm) = Farm::planned() else { return };
@@ -54,8 +52,7 @@ fn a_slice_that_cannot_be_written_fails() {
     assert!(farm.collected() == whole().files);
 }
 
-/// Slices, workers and submitters are killed at random moments. Afterwards what is there is whole, and the rest is
-/// done.
+/// Slices, workers and submitters are killed at random moments: what is there is whole, and the rest is done.
 #[test]
 fn kills_lose_at_most_the_slice() {
     let Some(farm) = Farm::planned() else { return };

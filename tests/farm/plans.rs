@@ -1,5 +1,4 @@
-//! What is refused before any work is done: other programs, devices and inputs, and works and options that make no
-//! plan.
+//! What is refused before any work is done: other programs, devices and inputs; works and options that make no plan.
 
 use super::{DRAFT, Farm, common};
 use serde_json::{Value, json};

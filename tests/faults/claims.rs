@@ -1,5 +1,4 @@
-//! Devices that have less than the one at hand: each is refused with the number, or worked around with the same
-//! picture.
+//! Devices that have less than the one at hand: refused with the number, or worked around with the same picture.
 
 use super::claimed::Claims;
 use super::layer::watch;

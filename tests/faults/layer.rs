@@ -1,5 +1,4 @@
-//! A layer between the program and Vulkan, in the same process: it counts the calls that can fail and makes one of them
-//! fail, keeps a census of objects, and changes what a device claims to have.
+//! A layer between program and Vulkan in one process: lets a call fail, counts objects, changes what a device claims.
 
 #![allow(unsafe_code)]
 
@@ -74,8 +73,7 @@ pub fn watch<R>(plan: Option<Plan>, claims: Claims, run: impl FnOnce() -> R) -> 
     (outcome, heard)
 }
 
-/// Keeps an instance for as long as the process runs, and with it the drivers: loading them again takes a third of a
-/// short run.
+/// Keeps an instance, and with it the drivers, for good: loading them again takes a third of a short run.
 pub fn keep_drivers() {
     static KEPT: OnceLock<Option<(ash::Entry, ash::Instance)>> = OnceLock::new();
     // SAFETY: the system's loader is trusted, the structure outlives the call, and the instance is never destroyed.
@@ -173,8 +171,7 @@ pub unsafe extern "system" fn device_address(device: vk::Device, name: *const c_
     wrapped.filter(|wrapped| Some(*wrapped as usize) != of_loader.map(|real| real as usize)).or(Some(of_device))
 }
 
-/// A module for each function that is wrapped: where the loader's own function is kept, and the wrapper, which may fail
-/// with errors before all else.
+/// A module for each function that is wrapped: the loader's own, and the wrapper, which may fail before all else.
 macro_rules! module {
     (
         $name:ident: $pfn:ident($($parameter:ident: $type:ty),*) $(-> $result:ty)? $([$errors:expr])? { $($body:tt)* }

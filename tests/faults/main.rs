@@ -2,7 +2,7 @@
 //! one line with the right exit code, outputs whole or absent, and the next run in the same process is as if nothing
 //! had happened.
 //!
-//! A seeded tenth of the calls fails, or one in as many as the variable FAULTS_SHARE says: in an hour, all of them.
+//! A seeded twentieth of the calls fails, or one in as many as the variable FAULTS_SHARE says: in an hour, all of them.
 
 #[macro_use]
 mod layer;

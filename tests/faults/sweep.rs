@@ -72,8 +72,7 @@ impl Job {
         (made, heard)
     }
 
-    /// Calls that are to fail, each with one of its errors: a seeded one in `share` of all, and of names for debuggers,
-    /// which nobody misses, a tenth as many.
+    /// Calls that are to fail, each with one of its errors: a seeded one in `share`, a tenth of names for debuggers.
     fn faults(&self, share: usize, calls: &[Call]) -> Vec<Plan> {
         let is_wanted = |call: &Call| self.only.is_none_or(|parts| parts.iter().any(|part| call.name.contains(part)));
         let plans = |at: usize| (0..calls[at].errors.len()).map(move |error| Plan { at, error });
@@ -86,9 +85,8 @@ impl Job {
         faults
     }
 
-    /// Lets calls fail, each in a run of its own, and returns how many did. Runs follow each other in one process, and
-    /// up to its fault each makes the calls of a good one. After every eight this job runs without a fault, and must
-    /// make what it did before.
+    /// Lets calls fail, each in a run of its own, which makes the calls of a good one up to there; how many did. After
+    /// every eight, a run without a fault must make what it did before.
     pub fn sweep(&self, folder: &Path, share: usize) -> usize {
         let start = Instant::now();
         self.good(folder, "the first run");
@@ -114,8 +112,7 @@ impl Job {
         faults.len()
     }
 
-    /// A run without a fault makes what one did before, in the same process and with whatever the runs since left in
-    /// the cache.
+    /// A run without a fault makes what one did before, whatever the runs since left in the process and the cache.
     fn again(&self, folder: &Path, since: &str, expected: &[Option<Vec<u8>>]) {
         self.remove(folder, self.outputs);
         let what = format!("the run after {since}");
@@ -152,8 +149,7 @@ pub fn assert_clean(what: &str, heard: &Heard) {
     assert!(heard.wrong.is_empty(), "{what}: {:?}", heard.wrong);
 }
 
-/// Calls whose failure changes nothing that a user asked for: names for debuggers, the pipeline cache, and waiting for
-/// what has ended.
+/// Calls whose failure no user misses: names for debuggers, the pipeline cache, waiting for what has ended.
 fn is_forgiven(call: Call) -> bool {
     let forgiven = ["vkSetDebugUtilsObjectNameEXT", "vkGetPipelineCacheData", "vkDeviceWaitIdle", "vkWaitForFences"];
     forgiven.contains(&call.name)

@@ -14,8 +14,7 @@ use std::time::Duration;
 const SIZE: [u32; 2] = [48, 32];
 const FORMAT: ash::vk::Format = ash::vk::Format::R8G8B8A8_SRGB;
 
-/// Draws a still scene with the overlay, then the same edited, then without the overlay, and writes the last frame as
-/// `w.raw`. The scene's fields are in the cache.
+/// Draws a still scene with the overlay, edited, and without the overlay: `w.raw`. The scene's fields are in the cache.
 pub fn run(folder: &Path) -> Result<()> {
     let cache_dir = folder.join("cache");
     let options = DeviceOptions { cache_dir: Some(cache_dir.clone()), ..DeviceOptions::default() };

@@ -1,5 +1,4 @@
-//! FLIP against the authors' program (flip-evaluator 1.7, LDR, 0.7 m from a screen of 3840 pixels and 0.7 m) on made-up
-//! pictures, and the properties that its paper states.
+//! FLIP against the authors' flip-evaluator 1.7 (LDR, 0.7 m from 3840 pixels on 0.7 m), and what its paper states.
 
 use shadow_fields::truth::flip::flip;
 

@@ -27,8 +27,7 @@ fn field(lattice: Lattice, seed: u64) -> ShadowField {
     ShadowField { header, payload }
 }
 
-/// By how much a step of a billionth changes a lookup more than the slopes on both sides explain, relative to the
-/// largest coefficient there.
+/// What a step of a billionth changes more than the slopes beside it explain, relative to the largest coefficient.
 fn excess(field: &ShadowField, place: DVec3, across: DVec3) -> f64 {
     let at = |step: f64| {
         let mut out = [0.0; 4];
@@ -44,9 +43,8 @@ fn excess(field: &ShadowField, place: DVec3, across: DVec3) -> f64 {
     (jump - 4.0 * tiny * slope) / largest
 }
 
-/// A step of a billionth across anything that a lookup is made of changes no coefficient by more than the slope on
-/// either side explains. Only where the first shell is crossed the shells' own coordinate has a vertical tangent (a
-/// square root).
+/// A step of a billionth across anything that a lookup is made of changes no coefficient by more than its slopes. Where
+/// the first shell is crossed the shells' own coordinate has a vertical tangent (a square root).
 #[test]
 fn lookups_are_continuous() {
     let round = ["cube:6x5,inner=0.4", "cube:6x7,inner=0.5", "cube:6x5,edges,inner=0.5", "cube:6x3,inner=1.02"];

@@ -30,8 +30,7 @@ pub fn plan(bytes: &[u8]) -> Result<()> {
     Ok(())
 }
 
-/// A plan whose results lie beside the file of inputs, and the result of its first slice. Naming that takes as long as
-/// reading it.
+/// A plan whose results lie beside the inputs, and the path of its first: naming takes as long as reading.
 fn with_plan<R>(run: impl FnOnce(&Plan, &Path) -> R) -> R {
     thread_local! {
         static PLAN: (Plan, PathBuf) = {

@@ -13,8 +13,7 @@ const NUMBERS: &str = "\
 /// The same as little-endian words.
 const WORDS: [u32; 10] = [0, 1, 7, 0x7f, 0xff, 0xffff, 0x7fff_ffff, 0x8000_0000, 0x7fc0_0000, 0xffff_ffff];
 
-/// An input changed in one to four ways; `other` is another input, `tokens` are words of the format between
-/// bars.
+/// An input changed in one to four ways, by another input and by words of the format, `tokens` between bars.
 pub fn mutated(random: &mut Rng, input: &[u8], other: &[u8], tokens: &str) -> Vec<u8> {
     let mut out = input.to_vec();
     for _ in 0..1 << random.u32(0..3) {

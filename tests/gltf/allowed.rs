@@ -1,5 +1,4 @@
-//! glTF files that few programs write and the specification allows: they are read, and what is left out of them is
-//! said.
+//! glTF files that few programs write and the specification allows are read; what is left out of them is said.
 
 use crate::model::{self, F32, Model, load, read, robot, room};
 use serde_json::{Value, json};
@@ -180,8 +179,7 @@ fn unknown_types_are_left_out() {
     }
 }
 
-/// Words that a later version may add to a list do not keep a file from being read, and nor does a primitive that has
-/// no positions yet.
+/// Words that a later version may add, and primitives without positions, do not keep a file from being read.
 #[test]
 fn unlisted_words_and_primitives_without_positions_are_left_out() {
     let whole = load(&room()).data;
@@ -203,8 +201,7 @@ fn unlisted_words_and_primitives_without_positions_are_left_out() {
     assert!(import.notes.left_out().contains(&note), "{:?}", import.notes.left_out());
 }
 
-/// A matrix beside a translation, rotation or scale counts alone, and rotations are brought to unit length: both are
-/// said.
+/// A matrix beside other transformations counts alone, and rotations are brought to unit length: both are said.
 #[test]
 fn odd_transformations_are_noted() {
     let unit = json!([0, 0, 0, 1]);

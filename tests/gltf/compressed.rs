@@ -1,5 +1,4 @@
-//! Meshes compressed by Draco and meshoptimizer and textures in KTX2 and WebP: as if they were not, or refused in one
-//! line.
+//! Meshes by Draco and meshoptimizer, textures in KTX2 and WebP: as if not packed, or refused in one line.
 
 use crate::model::{Model, load, read, refusal};
 use glam::{Vec2, Vec3};

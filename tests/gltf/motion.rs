@@ -1,5 +1,4 @@
-//! Animations of glTF models as motion of nodes, against the specification's formulas, and that motion as a scene file
-//! has it.
+//! Animations of glTF models as motion of nodes, against the specification's formulas, and in scene files.
 
 use crate::model::{Model, QUARTER, load, near};
 use glam::{DMat4, DQuat, DVec3, Vec3};
@@ -87,8 +86,7 @@ fn rotations_take_the_short_way_and_scales_grow() {
     }
 }
 
-/// A pair: a body that turns about +y and carries a moon, which turns about its own +x, held by a still arm between
-/// them.
+/// A body that turns about +y and carries a moon, which turns about its own +x, on a still arm.
 fn pair() -> Model {
     let mut model = Model::default();
     let body = cube(&mut model, json!({ "name": "body", "translation": [1, 0, 0], "scale": [2, 2, 2] }));

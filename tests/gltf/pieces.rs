@@ -72,8 +72,7 @@ fn meshes(parts: &[(&Mesh, Vec3)], material: serde_json::Value) -> Vec<Arc<Mesh>
     of(&scene, "one").iter().map(|entity| scene.meshes[entity.mesh].clone()).collect()
 }
 
-/// Bulbs that stand apart are lamps, up to 32; of more, neighbours are one. What touches is one lamp, and a ring of neon
-/// is cut into parts that are not bent.
+/// Bulbs apart are lamps, up to 32; of more, neighbours are one. What touches is one; a neon ring is cut.
 #[test]
 fn lamps_of_several_bulbs_are_several_lamps() {
     let glow = || json!({ "emissiveFactor": [1, 1, 1] });
@@ -201,8 +200,7 @@ fn a_quad_that_glows_is_a_rectangle_that_shines_from_both_sides() {
     }
 }
 
-/// A file of more nodes than a scene has entities: neighbours at rest are one mesh, each where its node stands. What
-/// moves, glows or is wide stays alone.
+/// Of more nodes than a scene has entities, neighbours at rest are one mesh; what moves, glows or is wide stays alone.
 #[test]
 fn many_nodes_are_joined() {
     let mut model = Model::default();

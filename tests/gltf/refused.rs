@@ -1,5 +1,4 @@
-//! glTF files that are no good: the program ends with exit code 4 and one line that names the file and the place in its
-//! JSON.
+//! glTF files that are no good: exit code 4 and one line that names the file and the place in its JSON.
 
 use crate::cli::Folder;
 use crate::model::{F32, Model, U8, glb, read, refusal, room};

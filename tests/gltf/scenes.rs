@@ -292,8 +292,7 @@ fn lights_are_balls_of_their_intensity() {
     assert!((683.0 * emission / lamp.emission - 1.0).truncate().length() < 1e-5, "{emission}");
 }
 
-/// A spot 2 m above a floor, by ray casting: what the floor gets is the intensity over the square of the distance,
-/// times the falloff that KHR_lights_punctual recommends.
+/// A spot 2 m above a floor, by rays: intensity over squared distance, and the falloff of KHR_lights_punctual.
 #[test]
 fn spots_shine_within_their_cone() {
     let mut model = Model::default();

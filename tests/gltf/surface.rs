@@ -282,8 +282,7 @@ fn alphas_of_vertices_blend_a_surface() {
     assert_eq!(scene.entities[1].opacity, 1.0);
 }
 
-/// Of blending the alpha is the opacity; glass keeps back what its colour does not pass, and what it passes it does not
-/// reflect.
+/// Of blending the alpha is the opacity; glass keeps back and reflects only what its colour does not pass.
 #[test]
 fn blended_and_transmissive_surfaces_let_light_through() {
     let mut model = Model::default();

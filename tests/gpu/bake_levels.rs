@@ -1,5 +1,4 @@
-//! Levels of detail in captures: what a field of a large mesh is off by where fewer triangles are drawn, and how many
-//! are.
+//! Levels of detail in captures: how many triangles fewer are drawn, and what a field is off by then.
 
 use crate::common::{Gpu, generate, gpu, relative_rms};
 use glam::Vec3;
@@ -10,8 +9,7 @@ use shadow_fields::bake::{self, BakeReport, Wanted};
 use shadow_fields::field::{FieldKind, Storage};
 use std::sync::Arc;
 
-/// Most that levels may move coefficients, relative root mean square: as much as faces of 64 texels round a binary
-/// cap's by.
+/// Most that levels may move coefficients, relative RMS: what faces of 64 texels round a binary cap's by.
 const OFF: f64 = 0.003;
 
 /// A closed surface with bumps of many sizes, down to those of its vertices, as of a scanned model.

@@ -1,5 +1,4 @@
-//! Light that bounces within a rigid group, against the closed form of a hollow sphere: of all that leaves one place of
-//! its inside, every other place receives the same.
+//! Light that bounces within a rigid group, against rays and the closed form of a hollow sphere.
 
 use super::common::{Gpu, generate, gpu, inside_out, joined, parse, part, relative_rms};
 use super::stage::{against_rays, small};
@@ -228,8 +227,7 @@ fn no_light_bounces_through_a_shut_door() {
     assert!(open > 0.0 && shut < 0.2 * open, "{shut}, with an open door {open}");
 }
 
-/// The light of the dark room comes through the doorway alone, not past the wall's foot, and not from the far side of a
-/// wall that both rooms share.
+/// The dark room's light comes through the doorway alone, not past the wall's foot or from the far side of a wall.
 #[test]
 fn light_bounces_through_a_door_and_not_through_walls() {
     let Some(gpu) = gpu() else { return };
@@ -264,8 +262,7 @@ fn light_bounces_through_a_door_and_not_through_walls() {
     assert_eq!(long, 0, "triangles reach from one room into the other");
 }
 
-/// Nothing of the bright outside of a house comes in, though walls, floor and ceiling are one mesh with it: runs of
-/// neighbouring vertices may be of both sides.
+/// The bright outside of a house does not come in, though runs of its one mesh may have vertices of both sides.
 #[test]
 fn a_closed_house_of_one_mesh_is_dark_within() {
     let Some(gpu) = gpu() else { return };

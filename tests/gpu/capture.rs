@@ -1,5 +1,4 @@
-//! Capture on the device against rays cast on the host: coverage, culling, faces left out, and colours on the right
-//! faces.
+//! Capture on the device against rays on the host: coverage, culling, faces left out, colours on the right faces.
 
 use crate::common::{generate, gpu, joined, teapot};
 use glam::{Quat, Vec3};
@@ -55,8 +54,7 @@ fn large_faces_are_computed_in_bands() {
     assert!(found.error() < 1e-3, "{found:?}");
 }
 
-/// From inside a solid only back faces are seen: culled, they vanish. This is why samples inside are not captured, and
-/// shows that culling takes place at all.
+/// From inside a solid only back faces are seen, and culled they vanish: why no sample inside is captured.
 #[test]
 fn culled_from_inside_a_solid_nothing_is_left() {
     let Some(gpu) = gpu() else { return };
@@ -73,8 +71,7 @@ fn culled_from_inside_a_solid_nothing_is_left() {
     }
 }
 
-/// Walls of a box around the origin, of one colour a direction, all components different; and a small box of one colour
-/// in front of one wall, in either order.
+/// Walls of a box around the origin, of one colour a direction, and a small box before one of them, in either order.
 fn painted_box(inner_first: bool) -> Mesh {
     let walls = generate::cuboid(Vec3::splat(2.0), 3);
     let small = generate::cuboid(Vec3::splat(0.1), 1);

@@ -99,8 +99,7 @@ fn nearer_hides_farther() {
     assert!(behind.iter().flatten().all(|c| *c == 0.0), "what is behind the camera is not seen");
 }
 
-/// Nothing in view is a picture of the sky alone, whatever smooths the edges, and what comes back into view is
-/// drawn again.
+/// Nothing in view is a picture of the sky alone, and what comes back into view is drawn again.
 #[test]
 fn nothing_in_view_is_a_picture_too() {
     let Some(gpu) = gpu() else { return };
@@ -245,8 +244,7 @@ fn quad(corners: [[f32; 3]; 4], tints: Option<Vec<Vec3>>) -> Mesh {
     Mesh::with_attributes("quad", corners, Vec::new(), attributes, vec![[0, 1, 2], [0, 2, 3]]).unwrap()
 }
 
-/// A texture shows at every pixel what its texel reflects of the light that a grey surface gets there, whether the pixel
-/// evaluates a sharp light itself or not; what its alpha masks is not there.
+/// A texel shows its share of a grey surface's light, whoever evaluates a sharp light; what alpha masks is not there.
 #[test]
 fn textures_multiply_the_light_of_a_grey_surface() {
     let Some(gpu) = gpu() else { return };

@@ -1,5 +1,4 @@
-//! Recordings that are launched and not waited for: how many, what they keep alive, that the next one sees what they
-//! wrote.
+//! Recordings that are launched and not waited for: how many, what they keep alive, what the next one sees.
 
 use crate::common;
 use common::gpu;

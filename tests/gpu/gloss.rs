@@ -59,8 +59,7 @@ fn a_panel_behind_a_surface_leaves_no_highlight() {
     assert!(brightest < 0.02, "{brightest}");
 }
 
-/// Under light that is the same from everywhere a white metal is as bright as the light, and one whose microfacets pass
-/// no light on to each other is as bright as its directional albedo.
+/// Under even light a white metal is as bright as the light, and with single scattering as its directional albedo.
 #[test]
 fn a_white_metal_vanishes_in_a_furnace() {
     let Some(gpu) = gpu() else { return };

@@ -70,8 +70,7 @@ fn error(gpu: &Gpu, scene: &Scene, bounces: Bounces) -> f64 {
     relative_rms(pairs.filter(|(found, truth)| found.max(*truth) < 0.6))
 }
 
-/// A room is one mesh, a lamp hangs a centimetre below its ceiling, and its walls are lit at few vertices: nothing that
-/// is behind the lamp hides it, as seen from a vertex or from between vertices.
+/// A lamp hangs 1 cm below the ceiling of a room of one mesh with few vertices: nothing behind the lamp hides it.
 #[test]
 fn a_room_of_one_mesh_is_lit_by_its_ceiling_lamp() {
     let solid = generate::cuboid(Vec3::splat(2.0), 1);
@@ -220,8 +219,7 @@ fn wall_with_window() -> Mesh {
     of_quads("wall", corners)
 }
 
-/// Sunlight falls through a window onto a glossy floor of two triangles: its patch and the highlight within have the
-/// edges that rays find.
+/// Sunlight through a window on a glossy floor of two triangles: patch and highlight have the edges of rays.
 #[test]
 fn a_window_casts_a_patch_of_sunlight_and_its_highlight() {
     let gloss = Some(toml::from_str("roughness = 0.4").unwrap());
@@ -237,8 +235,7 @@ fn a_window_casts_a_patch_of_sunlight_and_its_highlight() {
     }
 }
 
-/// The sun shines through the window of a house of one mesh, whose walls are thick: as its boxes the house blocks light in
-/// closed form, where the maps of its vertices blur the patch (0.55).
+/// Sun through the window of a house of one mesh: as boxes it blocks light in closed form; maps blur the patch (0.55).
 #[test]
 fn a_house_of_one_mesh_has_a_patch_of_sunlight() {
     let planes =
@@ -273,8 +270,7 @@ fn thin_bars_of_one_mesh_cast_whole_shadows() {
     assert_near_rays(scene, 0.04);
 }
 
-/// The sun falls through the window of a round tower of one mesh and past thin rods: its patch on the wall across has the
-/// window's edges and the rods' shadows, which were as fine as the wall's vertices (0.34).
+/// Sun through the window of a round tower and past thin rods: the patch is sharp, not as coarse as vertices (0.34).
 #[test]
 fn a_round_tower_has_a_patch_of_sunlight() {
     let place = |i: u32, y: f32| around(i, 24, 2.0, y);
@@ -299,8 +295,7 @@ fn a_round_tower_has_a_patch_of_sunlight() {
     assert_near_rays(scene, 0.1);
 }
 
-/// A vault of one sheet ends in a wall that is higher: below the vault no sun comes in along the line where they meet
-/// (0.55).
+/// A vault of one sheet ends in a higher wall: no sun comes in along the line where they meet (0.55).
 #[test]
 fn no_sunlight_comes_in_where_a_vault_meets_a_wall() {
     let place = |i: u32, z: f32| {
@@ -319,8 +314,7 @@ fn no_sunlight_comes_in_where_a_vault_meets_a_wall() {
     assert_near_rays(scene, 0.15);
 }
 
-/// A bulb in a thin open shade, and a ball that swings past: the edge of the shade's light is as soft on the wall as rays
-/// have it (0.044 with outlines).
+/// A bulb in a thin open shade, past which a ball swings: its edge on the wall is soft as by rays (0.044 by outlines).
 #[test]
 fn a_lampshade_has_a_soft_edge() {
     let place = |i: u32, radius: f32, y: f32| around(i, 32, radius, y);
@@ -457,9 +451,8 @@ fn a_pole_hides_the_part_of_its_lamp_that_it_reaches_into() {
     assert_near_rays(scene, 0.1);
 }
 
-/// A strip of sun 0.2 m wide comes through the roof of a hall. What it meets throws light by its area, not by how many
-/// vertices it happens to meet, and none of the sun that lies on the walls above the roof gets in: the mean over what no
-/// sun meets was 4.8 times that of rays.
+/// A strip of sun 0.2 m wide comes through a roof. It throws light by its area, not by the vertices that it meets, and
+/// none of the sun on walls above the roof gets in (4.8 times the light of rays).
 #[test]
 fn a_hall_is_lit_by_the_strip_of_sun_on_its_floor() {
     let Some(gpu) = gpu() else { return };
@@ -492,8 +485,7 @@ fn a_hall_is_lit_by_the_strip_of_sun_on_its_floor() {
     assert!((0.6..1.6).contains(&ratio), "{ratio}");
 }
 
-/// The sun shines on a closed room from outside. A carpet ends in the plane of a wall, where sun that only reaches the wall's
-/// outside lit its vertices, and light bounced from them filled the room (0.0008 of 60 000 in the mean).
+/// A carpet ends in a wall's plane in a closed room: sun on the wall's outside lit its vertices (0.0008 of 60 000).
 #[test]
 fn a_closed_room_in_the_sun_is_dark() {
     let Some(gpu) = gpu() else { return };
@@ -520,8 +512,7 @@ fn a_closed_room_in_the_sun_is_dark() {
     assert!(mean < 5e-4, "{mean}");
 }
 
-/// The sun falls through a hole in a cave onto a pool, which is a grid: before the cave, which is around the pool, its
-/// outline hid the half of it (0.55).
+/// Sun through a hole in a cave onto a pool, which is a grid: the outline of the cave around it hid the half (0.55).
 #[test]
 fn sun_through_the_hole_of_a_cave_lights_a_pool() {
     let ball = generate::sphere(2.0, 4);

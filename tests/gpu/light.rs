@@ -7,8 +7,7 @@ use shadow_fields::lists::skip::Skip;
 use shadow_fields::scene::{Placement, Scene};
 use shadow_fields::{bake, frame};
 
-/// A denser lattice for comparisons with closed forms, f32. Faces are fine, because a walk along a row of samples meets
-/// one or two of them at a time, and a texel too many or too few of each counts.
+/// A denser lattice in f32 for closed forms. Faces are fine: a walk meets one or two samples at a time; texels count.
 fn fine() -> frame::Options {
     frame::Options {
         bake: bake::Options { lattice: "cube:12x7,edges=auto".parse().unwrap(), face_px: 128, ..small().bake },
@@ -48,9 +47,8 @@ fn white_furnace() {
     assert!(worst < 1e-3, "{worst:e}");
 }
 
-/// A sphere of radius 1 carried around one vertex: at the zenith the irradiance left is 1 - sin^2 of its half-angle; on
-/// the way to the nadir it follows what four bands can hold, without a step; below the horizon next to nothing is left
-/// of it.
+/// A sphere carried around a vertex: at the zenith irradiance is 1 - sin^2 of its half-angle, then it follows what four
+/// bands hold, without a step, and below the horizon next to nothing is left of it.
 #[test]
 fn occluder_from_zenith_to_nadir() {
     let Some(gpu) = gpu() else { return };

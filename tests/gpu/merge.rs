@@ -103,8 +103,7 @@ fn emitters_that_occlude_and_receive() {
     assert!(sum(&light[0]) > 0.0);
 }
 
-/// On the line x = 0 of the floor, a light and its mirror image, an occluder, are equally far, bit for bit: their order
-/// in the file decides whether the occluder counts.
+/// On the floor's line x = 0 a light and its mirror image, an occluder, are equally far to the bit: the index decides.
 #[test]
 fn ties_go_by_index() {
     let Some(gpu) = gpu() else { return };
@@ -130,8 +129,7 @@ fn ties_go_by_index() {
     assert_eq!(again, before, "of two equal occluders the one behind the light changes nothing");
 }
 
-/// A floor under so many balls, without skips, that its lists are longer than any other buffer: a small light and the
-/// sky.
+/// A floor under so many balls, without skips, that its lists are longer than any other buffer; a small light, the sky.
 fn crowd() -> (Scene, frame::Options) {
     let mut text = "environment = { uniform = [0.1, 0.2, 0.3] }\n\
         [[mesh]]\nname = \"floor\"\nplane = { size_m = 6, cells = 32 }\n\

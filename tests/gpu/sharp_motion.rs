@@ -1,5 +1,4 @@
-//! Sharp lights that grow and move: light on vertices and pixels changes as the exact light of balls changes, without
-//! steps and without flicker.
+//! Sharp lights that grow and move: light changes as the exact light of balls does, without steps and flicker.
 
 use crate::common;
 use common::{gpu, parse};
@@ -47,8 +46,7 @@ fn disc(count: usize) -> Vec<DVec2> {
     (0..count).map(|k| turn(k) * ((k as f64 + 0.5) / count as f64).sqrt()).collect()
 }
 
-/// Radiosity of a white floor at `point` under a shining ball past another one, by directions to places of the light's
-/// disc.
+/// Radiosity of a white floor at `point` under a shining ball past another, by directions to its disc.
 fn exact(point: DVec3, occluder: (DVec3, f64), light: (DVec3, f64), disc: &[DVec2]) -> f64 {
     let to = light.0 - point;
     let sine = light.1 / to.length();
@@ -78,8 +76,7 @@ fn lit(frame: &mut Frame, scene: &Scene, placements: &[Placement]) -> [Vec<f64>;
     [numbers.iter().map(|&v| f64::from(found[v][0])).collect(), numbers.par_iter().map(truth).collect()]
 }
 
-/// A light that grows from 0.1 to 60 degrees across: what a vertex sees of it follows the exact share, and changes by
-/// no more from size to size.
+/// A light that grows from 0.1 to 60 degrees across: vertices follow the exact share, and change by no more a step.
 #[test]
 fn a_light_grows_without_a_step() {
     let Some(gpu) = gpu() else { return };
@@ -116,8 +113,7 @@ fn a_light_grows_without_a_step() {
     assert!(found < 1.3 * truth && error < 0.02, "{found} against {truth}, error {error}");
 }
 
-/// On a floor of few cells some pixels evaluate the light and others have it from vertices, and which do changes as
-/// things move: rows change by at most 1.3 times as much as they should.
+/// Which pixels evaluate the light changes as things move: rows change by at most 1.3 times as much as they should.
 #[test]
 fn pixels_do_not_flicker_in_slow_motion() {
     let Some(gpu) = gpu() else { return };

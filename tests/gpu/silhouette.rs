@@ -13,8 +13,7 @@ fn bake(gpu: &Gpu, mesh: &Mesh, options: SilhouetteOptions) -> SilhouetteField {
     bake_silhouette(&gpu.baker(), mesh, options, &|_, _| ()).unwrap().0
 }
 
-/// Light of a light of radiance 1 that the object blocks: irradiance at `point` (object's frame, in r) on a surface
-/// with `normal`, and what it is without the object.
+/// Irradiance of radiance 1 that the object blocks at `point` (its frame, in r), and that without the object.
 fn blocked_light(field: &SilhouetteField, point: DVec3, normal: DVec3, light: &SeenLight) -> [f64; 2] {
     let mut sums = [0.0, 0.0];
     for (toward, parts) in light.blocks() {
@@ -94,9 +93,8 @@ fn table() -> Mesh {
     joined(&[(&board, Vec3::Y * 0.67), at(-1.0, -1.0), at(-1.0, 1.0), at(1.0, -1.0), at(1.0, 1.0)])
 }
 
-/// Places within the bounding sphere: in a ring's hole, about a teapot and inside its handle, below a table's board,
-/// over a slab and beside a box. The last two are convex and have no halves; most of the places around them lie outside
-/// the object's box.
+/// Places within the bounding sphere: in a ring's hole, in a teapot's handle, below a table, over a slab and beside a
+/// box. The last two are convex and have no halves; around them most places lie outside the object's box.
 #[test]
 fn receivers_and_lights_within_the_bounding_sphere_see_what_lies_between_them() {
     const PAIRS: usize = 400;

@@ -1,5 +1,4 @@
-//! What is not done: an unmoved scene merges nothing, and one in which something moves comes to the bits of a full
-//! merge; what is dropped as small stays within its bound.
+//! What is left out: an unmoved scene merges nothing, a moved one comes to the same bits, small things have a bound.
 
 use crate::common::{gpu, parse};
 use crate::stage::{at, difference, jostled, scene, small};
@@ -120,8 +119,7 @@ fn a_light_of_zeros_is_left_off() {
     assert!(light.iter().flatten().flatten().all(|c| *c == 0.0) && frame.merged().merged_entries == 0);
 }
 
-/// The one ball that is lit shadows nothing but itself: its field is not baked, and its light is the same as beside a
-/// second receiver, for which it is.
+/// The one ball that is lit shadows only itself: its field is not baked, and its light is as beside a second receiver.
 #[test]
 fn what_no_receiver_sees_is_not_baked() {
     let Some(gpu) = gpu() else { return };
@@ -144,8 +142,7 @@ fn what_no_receiver_sees_is_not_baked() {
 const FAR_PATCH: &str = "[[mesh]]\nname = \"patch\"\nplane = { size_m = 1, cells = 2 }\n\
      [[entity]]\nmesh = \"patch\"\nposition = [0, -50, 0]\noccludes = false\n";
 
-/// One cluster in a wide town: what rays say that the dropped occluders and lights took and brought is within the
-/// bound, and so is what the merge itself changes.
+/// One cluster in a wide town: by rays and in the merge, what dropped occluders and lights change is within the bound.
 #[test]
 fn what_is_dropped_stays_within_its_bound() {
     let Some(gpu) = gpu() else { return };
@@ -191,8 +188,7 @@ fn what_is_dropped_stays_within_its_bound() {
     }
 }
 
-/// A ball, a ring and a box that go away from a floor, turning, through the sizes at which their fields are left for
-/// caps: the light of every vertex goes on as smoothly as with fields alone, and stays near to it.
+/// Things go away, turning, through the sizes at which caps stand for fields: light goes on as smoothly as by fields.
 #[test]
 fn nothing_pops_as_fields_become_caps() {
     let Some(gpu) = gpu() else { return };

@@ -1,5 +1,4 @@
-//! Those who watch are watched: the validation layer hears a hazard, and the tracker objects to a barrier that is left
-//! out of a bake.
+//! Those who watch are watched: the layer hears a hazard, the tracker misses a barrier of a bake.
 
 use crate::common::{Gpu, generate, gpu};
 use shadow_fields::Error;

@@ -34,8 +34,7 @@ const CRASHED: &str = "\
 
 const TAP: &str = "1..4\nok 1 - a\nnot ok 2 - b [x]\nnot ok 3 c\nok 4 - d # SKIP no device\n";
 
-/// A failure passes only if it is on the list; what no longer fails or did not run is told; crashes and empty runs
-/// fail; and TAP is read too.
+/// Only listed failures pass; what is mended or did not run is told; crashes and empty runs fail; TAP is read too.
 #[test]
 fn lists_and_outputs_of_every_kind() {
     let last = CRASHED.replace("\ntest result: ok.\n", "\n");

@@ -3,8 +3,7 @@
 use std::collections::BTreeSet;
 use std::process::Command;
 
-/// Crates of the program, by what they are: argument parser, progress bar, log output, plots, lettering; and of the
-/// window.
+/// Crates of the program (argument parser, progress bar, log output, plots, lettering) and of the window.
 const PROGRAM: [&str; 6] = ["clap", "clap_builder", "indicatif", "env_logger", "colorous", "font8x8"];
 const WINDOW: [&str; 4] = ["winit", "egui", "ash-window", "raw-window-handle"];
 

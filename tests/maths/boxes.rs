@@ -13,8 +13,7 @@ fn holds(solid: &PlacedCuboid, place: DVec3) -> bool {
     solid.cuboid.half_edges.iter().all(along)
 }
 
-/// A house with a window, a flight of stairs, a ring and an open box, turned and moved: exactly their cells lie within
-/// boxes, and with any two that share a face lies a box across it.
+/// A house, stairs, a ring and an open box, turned and moved: boxes fill just their cells, and reach across faces.
 #[test]
 fn boxes_fill_a_solid_and_overlap() {
     let house = |[x, y, z]: [usize; 3]| (x, y, z) != (2, 2, 0) && (x % 4 == 0 || y % 4 == 0 || z % 2 == 0);

@@ -14,8 +14,7 @@ const BANDS: usize = 4;
 /// A cap: axis and half angle in radians.
 type Cap = (DVec3, f64);
 
-/// Irradiance of a horizontal plane under a uniform sky of unit irradiance, behind a chain of caps; `multiply` takes the
-/// blocked part of one off the rest.
+/// Irradiance of a level plane under a sky of unit irradiance past caps, which `multiply` takes off the rest.
 fn chain(caps: &[Cap], multiply: fn(&Multiplier, &mut ChainState, &[f64])) -> f64 {
     let multiplier = Multiplier::new(BANDS);
     let mut t = multiplier.begin(&clamped_cosine(BANDS, DVec3::Y));

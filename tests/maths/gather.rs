@@ -21,8 +21,7 @@ struct Crowded {
     clusters: Vec<ClusterBounds>,
 }
 
-/// Entities near and far, of which every fifth does not occlude and every 25th shines, in harmonics, in colours or
-/// sharply.
+/// Entities near and far: every fifth does not occlude, every 25th shines, in harmonics, in colours or sharply.
 fn random_entities(rng: &mut fastrand::Rng, count: usize, spread_m: f64, corner: DVec3) -> Vec<EntityBounds> {
     (0..count)
         .map(|i| EntityBounds {

@@ -42,8 +42,7 @@ fn any_command() -> impl Strategy<Value = Command> {
 proptest! {
     #![proptest_config(ProptestConfig { cases: 150, rng_seed: proptest::test_runner::RngSeed::Fixed(7), failure_persistence: None, ..ProptestConfig::default() })]
 
-    /// Whatever is done: everything stays finite and within what a scene file holds, undo takes it all back, redo
-    /// brings it again.
+    /// Whatever is done stays finite and fit for a scene file; undo takes it all back, redo brings it again.
     #[test]
     fn any_commands(commands in prop::collection::vec(any_command(), 1..60)) {
         let mut editor = from_text(SMALL);

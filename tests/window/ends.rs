@@ -3,8 +3,7 @@
 use crate::viewing::{desk, open};
 use shadow_fields::scene::Scene;
 
-/// Xlib would end the process: instead, edits are saved beside the scene, and one line says so. The same holds where
-/// another program destroys the window, by its close button or at random.
+/// Where display or window are lost, edits are saved beside the scene and one line says so; Xlib alone would exit.
 #[test]
 fn a_lost_display_and_a_destroyed_window_save_edits() {
     for (is_lost, is_still) in [(true, true), (true, false), (false, true), (false, false)] {

@@ -102,8 +102,7 @@ impl<'d> View<'d> {
         }
     }
 
-    /// Closes the window by its key: the program ends well, and the validation layers have said nothing. Everything
-    /// that was logged.
+    /// Closes the window by its key: the program ends well, the validation layers are silent. All that was logged.
     pub fn close(self) -> Vec<String> {
         self.display.xdotool(&["key", "ctrl+q"]);
         let (code, heard) = self.end();

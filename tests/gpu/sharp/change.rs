@@ -1,5 +1,4 @@
-//! What a frame with sharp lights shows once something is switched: an entity, a light, or the way in which edges are
-//! smoothed.
+//! What a frame with sharp lights shows once an entity, a light or the way to smooth edges is switched.
 
 use super::{HEAD, parse, scenes};
 use crate::common::gpu;
@@ -37,8 +36,7 @@ fn pixels_follow_switches_of_entities() {
     assert!(without == show(&mut new(&bare)), "a frame that was made for the other scene shows something else");
 }
 
-/// Vertices are marked that a shadow's edge comes near, but only while pixels read the marks: a frame that goes over to
-/// four samples a pixel shows what a frame does that began with them.
+/// Vertices near a shadow's edge are marked while pixels read that, also after a switch to four samples a pixel.
 #[test]
 fn edges_are_marked_where_pixels_read_them() {
     let Some(gpu) = gpu() else { return };
@@ -91,8 +89,7 @@ fn a_light_that_is_switched_on_meets_the_chains() {
     assert!(without == light(&mut frame), "lights that do not shine change nothing");
 }
 
-/// A frame without sharp lights lacks the pass that a scene with one needs, and a pass that was compiled for balls of light
-/// alone would take a disc that is switched on for one.
+/// A frame without sharp lights lacks their pass, and one compiled for balls of light would take a disc for one.
 #[test]
 fn a_frame_covers_no_scene_whose_sharp_lights_have_no_pass() {
     let Some(gpu) = gpu() else { return };

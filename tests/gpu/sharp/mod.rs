@@ -102,8 +102,7 @@ fn under_a_spot(spot: &str) -> String {
     )
 }
 
-/// Spots that fade, that are narrow and that end sharply are as near to rays as the same lamp without a cone, and
-/// spherical harmonics for all other lights leave them as they are.
+/// Spots of any fade are as near to rays as the lamp without a cone, also where all other lights are in harmonics.
 #[test]
 fn spots_are_lit_as_by_rays() {
     let Some(gpu) = gpu() else { return };
@@ -138,9 +137,8 @@ fn picture(gpu: &Gpu, scene: &Scene, shading: Shading) -> (Vec<f32>, Option<u32>
     (frame.picture(), timings.iter().find_map(|timing| timing.counted))
 }
 
-/// On floors and slabs of few cells pixels show what the vertices of a fine floor show, and the coarse ones' own
-/// vertices do not: pixels carry the rims of shadows and spots, tell lamps and their occluders apart, and are lit by a
-/// lamp that is near.
+/// On coarse floors and slabs pixels show what vertices of a fine floor do and their own do not: rims of shadows and
+/// spots, lamps and occluders apart, a lamp that is near.
 #[test]
 fn pixels_carry_edges_that_vertices_do_not() {
     let Some(gpu) = gpu() else { return };
@@ -222,8 +220,7 @@ fn pixels_that_nothing_shades_look_as_vertices_show_them() {
     assert!(differing > 0, "the speck shades nothing");
 }
 
-/// A ring's bounding sphere stands before a light for many clusters whose rays all pass through its hole or beside it,
-/// and a ball covers a light from clusters in the middle of its shadow.
+/// Of many clusters all rays pass a ring's hole or miss it, and in the middle of its shadow a ball covers the light.
 #[test]
 fn what_outlines_leave_off_lists_changes_nothing() {
     let Some(gpu) = gpu() else { return };
@@ -295,8 +292,7 @@ fn lights_add_up_where_points_leave_out_what_stands_beside() {
     assert!(differing.is_empty(), "{differing:?}");
 }
 
-/// A sun's light on a floor that nothing shades, against its closed form: radiance * sin^2(a / 2) * cosine of a white
-/// surface.
+/// A sun on a bare floor, against its closed form: radiance * sin^2(a / 2) * cosine of a white surface.
 #[test]
 fn a_sun_lights_as_its_closed_form() {
     let Some(gpu) = gpu() else { return };

@@ -59,8 +59,7 @@ fn nine_bands_are_refused() {
     evaluate(9, DVec3::Z, &mut [0.0; 81]);
 }
 
-/// A product of two functions of band l is a polynomial of degree 2 l: a rule integrates the products up to its own
-/// degree, and no further.
+/// Products of two functions of band l have degree 2 l: a rule integrates them up to its own degree, no further.
 #[test]
 fn basis_is_orthonormal_by_rules_of_its_degree() {
     let icosahedral = icosahedral_rule();

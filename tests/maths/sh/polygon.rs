@@ -31,8 +31,7 @@ impl Rectangle {
         polygon(&[(x0, y0), (x1, y0), (x1, y1), (x0, y1)].map(|(x, y)| self.corner(x, y)))
     }
 
-    /// The integral over the rectangle by the midpoint rule, where places are spread as a light's that passes over it:
-    /// x = height sinh(t).
+    /// The integral by the midpoint rule with places as dense as a passing light's: x = height sinh(t).
     fn quadrature(&self, steps: u32) -> Coefficients {
         let mut sum = [0.0; POLYGON_COEFFICIENTS];
         let node = |i: u32, axis: usize| {
@@ -75,8 +74,7 @@ fn rectangles_cover_what_quadrature_sums() {
     }
 }
 
-/// Cut in four, a rectangle covers what its parts cover together: far away, close by, at grazing angles, and where a cut
-/// passes below the eye.
+/// A rectangle covers what its four parts do: far, close by, at grazing angles, where a cut passes below the eye.
 #[test]
 fn parts_add_up() {
     for height in [1e4, 1.0, 1e-3, 1e-7] {

@@ -50,8 +50,7 @@ fn floor_positions(scene: &Scene) -> Vec<(Vertex, DVec3)> {
     receiver_vertices(scene).into_iter().filter(|v| v.entity == 0).map(place).collect()
 }
 
-/// Share of a horizontal plane's irradiance under a uniform sky that a sphere wholly above it takes: sin^2 of its half
-/// angle times the cosine towards it.
+/// Share of an even sky's irradiance that a sphere above a level plane takes: sin^2 of its half-angle times the cosine.
 fn taken(position: DVec3) -> f64 {
     let to = DVec3::Y - position;
     0.25 / to.length_squared() * to.normalize().y
@@ -167,8 +166,7 @@ fn a_pixel_is_lit_where_its_middle_meets_the_floor() {
     assert!(lit.len() > 300 && near_form > lit.len() * 8 / 10 && near_form < lit.len(), "{near_form} of {}", lit.len());
 }
 
-/// A patch that stands on a floor sees half of the sky, wherever its rim lies within rounding of the floor, and the
-/// rim's vertices as all others.
+/// A patch that stands on a floor sees half of the sky, also at its rim, which lies within rounding of the floor.
 #[test]
 fn a_floor_blocks_the_light_from_below() {
     for sunk in [-1e-6, 0.0, 1e-6] {

@@ -3,8 +3,7 @@
 use super::{ball, bulb, floor_positions, scene};
 use shadow_fields::truth::{RayCast, Vertex, World, receiver_vertices};
 
-/// Radiosity of the floor's middle, where the light's cone stands upright, of a light of radius `radius_m` at
-/// `height_m`: albedo 0.6, radiance 9.
+/// Radiosity of the floor below a light of `radius_m` upright at `height_m`: albedo 0.6, radiance 9.
 fn below(radius_m: f64, height_m: f64) -> f64 {
     0.6 * 9.0 * (radius_m / height_m).powi(2)
 }

@@ -101,8 +101,7 @@ fn output_that_cannot_be_written() {
     folder.refused(&format!("render s.toml -o dir.png --size 8x8 {TINY}"), 1, &["dir.png: "]);
     folder.refused("demo -o file", 1, &["file: "]);
     // A cache that cannot be kept is a warning.
-    let ran = finish(&mut folder.bare(&format!("{RENDER} --size 8x8 --cache-dir file/x {TINY}")));
-    assert_eq!(ran.code, 0, "{}", ran.stderr);
+    let ran = finish(&mut folder.bare(&format!("{RENDER} --size 8x8 --cache-dir file/x {TINY}"))).ended(0, &[]);
     let lines: Vec<&str> = ran.stderr.lines().filter(|line| !line.starts_with("note: ")).collect();
     assert!(lines.len() == 1 && lines[0].contains("file/x"), "{}", ran.stderr);
 }
@@ -160,8 +159,7 @@ fn usage_of_values_and_pairs() {
         ("bake m.obj -o f.sf --radiance 1e38,1,1", "from 0 to 1e15"),
         ("inspect f.sf --at 1e300,0,0", "expected a number from -1e15 to 1e15"),
     ] {
-        let ran = folder.run(line);
-        assert!(ran.code == 2 && ran.stderr.contains(part), "{line}: {} {}", ran.code, ran.stderr);
+        folder.run(line).ended(2, &[part]);
     }
     folder.refused(&format!("{RENDER} --environment no.hdr"), 4, &["no.hdr: ", "o such file"]);
     folder.write("text.exr", "no picture");

@@ -223,8 +223,7 @@ fn quiet_and_no_cache() {
     // Nothing is kept: neither in the named folder nor where the cache would be.
     let mut bare = folder.bare(&format!("{render} --no-cache --cache-dir named"));
     bare.env("XDG_CACHE_HOME", folder.at("home")).env("MESA_SHADER_CACHE_DISABLE", "true");
-    let ran = finish(&mut bare);
-    assert_eq!(ran.code, 0, "{}", ran.stderr);
+    let ran = finish(&mut bare).ended(0, &[]);
     assert!(ran.stderr.lines().count() <= 1, "only the note on the device: {}", ran.stderr);
     assert_eq!(folder.names(), ["p.png"]);
 }
@@ -246,10 +245,7 @@ fn shaders_can_be_replaced() {
 
     folder.write("glsl/merge.comp", source.replace(last, "sum * nonsense"));
     let line = 1 + source.lines().position(|l| l.contains(last)).unwrap();
-    let ran = folder.run(&render("broken.png"));
-    assert_eq!(ran.code, 1, "{}", ran.stderr);
-    let place = format!("merge.comp:{line}: ");
-    assert!(ran.stderr.contains(&place) && ran.stderr.contains("nonsense"), "no {place} in {}", ran.stderr);
+    folder.run(&render("broken.png")).ended(1, &[&format!("merge.comp:{line}: "), "nonsense"]);
     assert_eq!(folder.names(), ["edited.png", "glsl", "plain.png"]);
 }
 

@@ -72,8 +72,7 @@ fn outputs_do_not_replace_inputs() {
     // Folders take files of names that the command chooses.
     refused(&folder, "profile s.toml --output .", 2, &[".", "input s.toml"]);
     // The pictures before and after those of the scene are free.
-    let free = folder.run("render s.toml -o sky_####.png --first 4 --device none");
-    assert_eq!(free.code, 3, "{}", free.stderr);
+    folder.run("render s.toml -o sky_####.png --first 4 --device none").ended(3, &[]);
 }
 
 #[test]
@@ -87,8 +86,8 @@ fn outputs_do_not_replace_one_another() {
     ] {
         refused(&folder, line, 2, &[first, second]);
     }
-    let device = folder.run("render s.toml -o /dev/null --exr /dev/null --device none");
-    assert_eq!(device.code, 3, "a device takes everything: {}", device.stderr);
+    // A device takes everything.
+    folder.run("render s.toml -o /dev/null --exr /dev/null --device none").ended(3, &[]);
 }
 
 #[test]
@@ -203,8 +202,7 @@ fn inputs_that_are_no_files_are_refused_and_not_waited_for() {
     drop(socket);
     if has_device() {
         let line = "bake tri.obj -o f.sf --face-px 4 --lattice cube:1x1 --shader-dir .";
-        let ran = ended(&folder.command(line));
-        assert!(ran.code == 4 && ran.stderr.contains("project.comp: cannot be read"), "{} {}", ran.code, ran.stderr);
+        ended(&folder.command(line)).ended(4, &["project.comp: cannot be read"]);
     }
 }
 
@@ -215,7 +213,6 @@ fn pipes_of_a_shell_are_read() {
     for script in ["\"$0\" compare <(sleep 0.2; cat a.png) b.png", "cat a.png | \"$0\" compare /dev/stdin b.png"] {
         let mut bash = Command::new("bash");
         bash.current_dir(folder.path()).args(["-c", script, env!("CARGO_BIN_EXE_shadow-fields")]);
-        let ran = ended(&bash);
-        assert_eq!(ran.code, 0, "{script}: {}", ran.stderr);
+        ended(&bash).ended(0, &[]);
     }
 }

@@ -10,9 +10,7 @@ fn rms(value: &Value) -> f64 {
 #[test]
 fn unknown_cases_are_listed() {
     let Some(folder) = Folder::with_device() else { return };
-    let ran = folder.run("bench time-error --case moonlight --out out");
-    assert_eq!(ran.code, 2, "{}", ran.stderr);
-    assert!(ran.stderr.contains("moonlight") && ran.stderr.contains("glowing_torus"), "{}", ran.stderr);
+    folder.run("bench time-error --case moonlight --out out").ended(2, &["moonlight", "glowing_torus"]);
     assert!(!folder.at("out").exists(), "nothing is written");
 }
 
@@ -45,8 +43,7 @@ fn a_scene_of_ones_own() {
     let Some(folder) = Folder::with_device() else { return };
     folder.write("my ring.toml", own_scene(LIGHT));
     let mut asked = folder.command("bench time-error --quick --out out --json");
-    let ran = finish(asked.arg("my ring.toml"));
-    assert_eq!(ran.code, 0, "{}", ran.stderr);
+    let ran = finish(asked.arg("my ring.toml")).ended(0, &[]);
     let outcome: Value = serde_json::from_str(&ran.stdout).unwrap();
     for (part, count) in [("budgets", 1), ("qualities", 2), ("comparisons", 5)] {
         assert_eq!(outcome[part].as_array().unwrap().len(), count, "{part}");
@@ -111,21 +108,17 @@ fn a_scene_that_cannot_be_judged_says_why() {
     let ask = |name: &str| folder.run(&format!("bench time-error {name} --quick --out out"));
     for (name, text, expected) in scenes {
         folder.write(name, text);
-        let ran = ask(name);
-        assert_eq!(ran.code, 4, "{name}: {}", ran.stderr);
-        assert!(ran.stderr.contains(name) && ran.stderr.contains(expected), "{name}: {}", ran.stderr);
+        ask(name).ended(4, &[name, expected]);
         assert!(!folder.at("out").exists(), "nothing is written");
     }
-    assert_eq!(ask("absent.toml").code, 4);
-    let both = folder.run("bench time-error dark.toml --case torus --out out");
-    assert_eq!(both.code, 2, "a scene or cases");
+    ask("absent.toml").ended(4, &[]);
+    // A scene or cases.
+    folder.run("bench time-error dark.toml --case torus --out out").ended(2, &[]);
     if !has_device() {
         return;
     }
     // The floor is not lit from below, and only the ring's underside would see it: it does not receive here.
     let buried = own_scene(&buried).replace("position = [0, 0.6, 0]", "position = [0, 0.6, 0]\nreceives = false");
     folder.write("buried.toml", buried);
-    let ran = ask("buried.toml");
-    assert_eq!(ran.code, 4, "{}", ran.stderr);
-    assert!(ran.stderr.contains("no light reaches any of the 289 judged vertices"), "{}", ran.stderr);
+    ask("buried.toml").ended(4, &["no light reaches any of the 289 judged vertices"]);
 }

@@ -20,9 +20,21 @@ pub const TRIANGLE: &str = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n";
 
 /// What a run left behind.
 pub struct Ran {
+    command: String,
     pub code: i32,
     pub stdout: String,
     pub stderr: String,
+}
+
+impl Ran {
+    /// Asserts how it ended and that its stderr has these words.
+    #[track_caller]
+    pub fn ended(self, code: i32, words: &[&str]) -> Self {
+        let Ran { command, stderr, .. } = &self;
+        assert_eq!(self.code, code, "{command}: {stderr}");
+        words.iter().for_each(|word| assert!(stderr.contains(word), "{command}: no {word:?} in {stderr}"));
+        self
+    }
 }
 
 /// Folder of fields and shaders; emptied when a test binary starts, so that nothing of an earlier build is found.
@@ -54,7 +66,8 @@ pub fn command(folder: &Path, line: &str) -> Command {
 pub fn finish(command: &mut Command) -> Ran {
     let Output { status, stdout, stderr } = command.output().unwrap();
     let text = |bytes| String::from_utf8(bytes).expect("what the program says is UTF-8");
-    Ran { code: status.code().expect("it ended by itself"), stdout: text(stdout), stderr: text(stderr) }
+    let code = status.code().expect("it ended by itself");
+    Ran { command: format!("{command:?}"), code, stdout: text(stdout), stderr: text(stderr) }
 }
 
 /// Whether a device is there, as the program sees it.
@@ -146,10 +159,9 @@ impl Folder {
     }
 
     /// Runs the program with the words of a line, which must succeed.
+    #[track_caller]
     pub fn good(&self, line: &str) -> Ran {
-        let ran = self.run(line);
-        assert_eq!(ran.code, 0, "{line}: {}", ran.stderr);
-        ran
+        self.run(line).ended(0, &[])
     }
 
     /// What a good run prints as JSON.

@@ -2,7 +2,7 @@
 
 mod common;
 
-use common::{cache_dir, library, parse, report, skip};
+use common::{cache_dir, library, parse, report, shown, skip};
 use glam::Vec3;
 use shadow_fields::bake::cache::Cache;
 use shadow_fields::bake::{self, Baker};
@@ -107,8 +107,7 @@ fn frames_neither_drift_nor_take_more_memory() {
             frame.set_scene(&states[state as usize]).unwrap();
         }
         let placements = states[state as usize].at(moment as f64 * PERIOD_S / MOMENTS as f64);
-        frame.render(&placements, Some(1.0)).unwrap();
-        let picture = frame.picture();
+        let picture = shown(&mut frame, &placements, 1.0);
         match &first[(moment * STATES + state) as usize] {
             None => first[(moment * STATES + state) as usize] = Some(picture),
             Some(known) => {

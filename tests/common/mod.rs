@@ -173,11 +173,14 @@ impl Gpu {
         (0..placements.len()).map(|entity| frame.radiosity(entity).unwrap()).collect()
     }
 
+    /// The same of a scene at its start.
+    pub fn lit(&self, scene: &Scene, options: frame::Options) -> Vec<Vec<[f32; 3]>> {
+        self.light(&mut self.frame(scene, options), &scene.at(0.0))
+    }
+
     /// A picture of a scene at its start, linear RGB.
     pub fn picture(&self, scene: &Scene, options: frame::Options, white: f32) -> Vec<f32> {
-        let mut frame = self.frame(scene, options);
-        frame.render(&scene.at(0.0), Some(white)).unwrap();
-        frame.picture()
+        shown(&mut self.frame(scene, options), &scene.at(0.0), white)
     }
 
     /// What comes of recordings without the barrier of that index.
@@ -187,6 +190,12 @@ impl Gpu {
         self.device.omit_barrier(None);
         outcome
     }
+}
+
+/// A picture of things at their places, linear RGB.
+pub fn shown(frame: &mut Frame, placements: &[Placement], white: f32) -> Vec<f32> {
+    frame.render(placements, Some(white)).unwrap();
+    frame.picture()
 }
 
 /// A scene from its text, which may name files of the program.
@@ -206,6 +215,12 @@ pub fn joined(parts: &[(&Mesh, Vec3)]) -> Mesh {
         triangles.extend(part.triangles.iter().map(|t| t.map(|i| i + first)));
     }
     Mesh::new("joined", positions, normals, None, triangles).unwrap()
+}
+
+/// A mesh whose places are moved, with normals of its own.
+pub fn reshaped(mesh: &Mesh, place: impl Fn(Vec3) -> Vec3) -> Mesh {
+    let places = mesh.positions.iter().map(|p| place(*p)).collect();
+    Mesh::new("reshaped", places, Vec::new(), None, mesh.triangles.clone()).unwrap()
 }
 
 /// A mesh that faces the other way.

@@ -9,7 +9,7 @@ use shadow_fields::bounce::Bounces;
 use shadow_fields::scene::data::EntityData;
 use shadow_fields::scene::{Lights, Motion, Scene, SceneBuilder};
 use shadow_fields::truth::raycast::RayCast;
-use shadow_fields::truth::{Vertex, World, receiver_vertices};
+use shadow_fields::truth::{Estimate, Vertex, World, receiver_vertices};
 use shadow_fields::{bake, frame};
 
 const ALBEDO: f32 = 0.6;
@@ -36,8 +36,11 @@ fn hollow() -> Scene {
 }
 
 fn lit(gpu: &Gpu, scene: &Scene, bounces: Bounces) -> Vec<[f32; 3]> {
-    let mut frame = gpu.frame(scene, frame::Options { bounces, lights: Lights::Sharp, ..small() });
-    gpu.light(&mut frame, &scene.at(0.0)).remove(0)
+    gpu.lit(scene, frame::Options { bounces, lights: Lights::Sharp, ..small() }).remove(0)
+}
+
+fn by_rays(scene: &Scene, vertices: &[Vertex], rays: u32, bounces: u32) -> Vec<Estimate> {
+    RayCast { rays, bounces, ..RayCast::default() }.run(&World::of(scene, &scene.at(0.0)), vertices)
 }
 
 #[test]
@@ -93,19 +96,13 @@ fn usual(bounces: Bounces) -> frame::Options {
 fn what_moves_and_what_rests_light_each_other() {
     let Some(gpu) = gpu() else { return };
     let scene = parse(THINGS);
-    let placements = scene.at(0.0);
-    let light = |bounces| {
-        let mut frame = gpu.frame(&scene, usual(bounces));
-        gpu.light(&mut frame, &placements)
-    };
-    let [direct, one, all] = [Bounces::None, Bounces::One, Bounces::All].map(light);
-    let world = World::of(&scene, &placements);
+    let [direct, one, all] = [Bounces::None, Bounces::One, Bounces::All].map(|bounces| gpu.lit(&scene, usual(bounces)));
     let vertices: Vec<Vertex> = receiver_vertices(&scene).into_iter().step_by(7).collect();
     // Fronts of the floor's underside see nothing that the eye does.
     let is_above = |v: &Vertex| v.entity > 0 || scene.meshes[0].normals[v.index].y > 0.5;
     let vertices: Vec<Vertex> = vertices.into_iter().filter(is_above).collect();
     for (bounces, found, most) in [(1, &one, 0.075), (64, &all, 0.09)] {
-        let rays = RayCast { rays: 512, bounces, ..RayCast::default() }.run(&world, &vertices);
+        let rays = by_rays(&scene, &vertices, 512, bounces);
         let [without, with] = [&direct, found].map(|light| against_rays(light, &vertices, &rays));
         assert!(with < most && without > 2.4 * with, "{bounces}: {with}, {without} without");
     }
@@ -131,21 +128,15 @@ fn a_panel_below_a_ceiling_hides_what_it_lights() {
             "#
         );
         let scene = parse(&text);
-        let placements = scene.at(0.0);
-        let world = World::of(&scene, &placements);
         let floor = receiver_vertices(&scene).into_iter().filter(|v| v.entity == 0);
         let floor: Vec<Vertex> = floor.filter(|v| scene.meshes[0].normals[v.index].y > 0.5).step_by(13).collect();
         let rays = |bounces| {
-            let estimates = RayCast { rays: 1024, bounces, ..RayCast::default() }.run(&world, &floor);
+            let estimates = by_rays(&scene, &floor, 1024, bounces);
             estimates.into_iter().flat_map(|estimate| estimate.radiosity).sum::<f64>()
         };
-        let sum = |bounces| {
-            let mut frame = gpu.frame(&scene, usual(bounces));
-            let found = gpu.light(&mut frame, &placements);
-            floor.iter().flat_map(|v| found[v.entity][v.index]).map(f64::from).sum::<f64>()
-        };
         let [direct, all] = [0, 1].map(rays);
-        let found = sum(Bounces::One);
+        let light = gpu.lit(&scene, usual(Bounces::One));
+        let found: f64 = floor.iter().flat_map(|v| light[v.entity][v.index]).map(f64::from).sum();
         // Lit through the panel the floor would have half as much again.
         let error = found / all - 1.0;
         assert!(error.abs() < 0.03 && direct < 0.95 * all, "{error}: {found} for {direct} and {all}: {motion}");
@@ -193,12 +184,10 @@ fn what_moves_is_not_lit_through_walls() {
     let place = Vec3::new(-1.9, -0.2, 1.6);
     let ball = EntityData { position: place, motion: spin, ..stands("ball", 0.0, 0.0) };
     let scene = rooms().mesh("ball", generate::sphere(0.3, 2)).entity(ball).build().unwrap();
-    let placements = scene.at(0.0);
-    let light = gpu.light(&mut frame_of_rooms(&gpu, &scene), &placements);
+    let light = gpu.light(&mut frame_of_rooms(&gpu, &scene), &scene.at(0.0));
     let ball = receiver_vertices(&scene).into_iter().filter(|v| v.entity == 5);
     let ball: Vec<Vertex> = ball.step_by(3).collect();
-    let world = World::of(&scene, &placements);
-    let rays = RayCast { rays: 2048, bounces: 1, ..RayCast::default() }.run(&world, &ball);
+    let rays = by_rays(&scene, &ball, 2048, 1);
     let wanted: f64 = rays.iter().map(|truth| truth.radiosity[0]).sum();
     let found: f64 = ball.iter().map(|v| f64::from(light[5][v.index][0])).sum();
     // 1.65, and 2.7 by all that rests: runs of the walls that both rooms share have vertices on both sides.
@@ -233,13 +222,11 @@ fn light_bounces_through_a_door_and_not_through_walls() {
     let Some(gpu) = gpu() else { return };
     let scene = rooms().build().unwrap();
     let mut frame = frame_of_rooms(&gpu, &scene);
-    let placements = scene.at(0.0);
-    let light = gpu.light(&mut frame, &placements);
+    let light = gpu.light(&mut frame, &scene.at(0.0));
     let scene = frame.scene();
     let mesh = scene.surface(0);
     let dark: Vec<Vertex> = dark_vertices(scene).into_iter().step_by(5).collect();
-    let world = World::of(scene, &placements);
-    let rays = RayCast { rays: 2048, bounces: 1, ..RayCast::default() }.run(&world, &dark);
+    let rays = by_rays(scene, &dark, 2048, 1);
     let sums = |of: &dyn Fn(usize) -> f64| (0..dark.len()).map(of).sum::<f64>();
     let found = sums(&|i| f64::from(light[0][dark[i].index][0]));
     let wanted = sums(&|i| rays[i].radiosity[0]);
@@ -305,11 +292,7 @@ fn the_inside_of_a_shade_lights_walls_evenly() {
         .entity(EntityData { position: shade, ..lamp() })
         .build()
         .unwrap();
-    let placements = scene.at(0.0);
-    let [direct, one] = [Bounces::None, Bounces::One].map(|bounces| {
-        let mut frame = gpu.frame(&scene, usual(bounces));
-        gpu.light(&mut frame, &placements)
-    });
+    let [direct, one] = [Bounces::None, Bounces::One].map(|bounces| gpu.lit(&scene, usual(bounces)));
     // Places in corners see half of what those beside them do.
     let is_wall = |v: &Vertex| {
         let mesh = &scene.meshes[0];
@@ -317,8 +300,7 @@ fn the_inside_of_a_shade_lights_walls_evenly() {
         v.entity == 0 && mesh.normals[v.index].y == 0.0 && place.y < 1.2 && place.x.min(place.z) < 1.9
     };
     let walls: Vec<Vertex> = receiver_vertices(&scene).into_iter().filter(is_wall).step_by(41).collect();
-    let world = World::of(&scene, &placements);
-    let rays = |bounces| RayCast { rays: 1 << 14, bounces, ..RayCast::default() }.run(&world, &walls);
+    let rays = |bounces| by_rays(&scene, &walls, 1 << 14, bounces);
     let wanted = rays(1).into_iter().zip(rays(0)).map(|(one, direct)| one.radiosity[0] - direct.radiosity[0]);
     let found = walls.iter().map(|v| f64::from(one[0][v.index][0] - direct[0][v.index][0]));
     let error = relative_rms(found.zip(wanted));

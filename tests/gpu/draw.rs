@@ -1,6 +1,6 @@
 //! Pictures: what stands where, what hides what, and in which colour.
 
-use crate::common::{Gpu, gpu, relative_rms};
+use crate::common::{Gpu, gpu, relative_rms, shown};
 use crate::stage::{at, holed, scene, shines, small, stands};
 use glam::{DVec2, EulerRot, Quat, Vec2, Vec3};
 use shadow_fields::asset::environment::EnvironmentData;
@@ -38,8 +38,7 @@ type Picture = Vec<[f32; 3]>;
 fn draw(gpu: &Gpu, scene: &Scene, places: &[[f32; 3]], antialias: Antialias, white: f32) -> Picture {
     let placements: Vec<_> = places.iter().map(|&[x, y, z]| at(x, y, z)).collect();
     let mut frame = gpu.frame(scene, options(antialias));
-    frame.render(&placements, Some(white)).unwrap();
-    frame.picture().as_chunks().0.to_vec()
+    shown(&mut frame, &placements, white).as_chunks().0.to_vec()
 }
 
 /// Middle of what has a channel, in pixels from the left and the top, and its area in pixels.
@@ -91,8 +90,8 @@ fn nearer_hides_farther() {
     let mut frame = gpu.frame(&scene, options(Antialias::Samples));
     let far = |z| Placement { scale: 40.0, ..at(0.0, 0.0, z) };
     for (placements, front) in [([far(-300.0), far(-300.01)], RED), ([far(-300.01), far(-300.0)], BLUE)] {
-        frame.render(&placements, Some(1.0)).unwrap();
-        let found = frame.picture()[3 * centre..][..3].iter().map(|c| c.round()).collect::<Vec<_>>();
+        let picture = shown(&mut frame, &placements, 1.0);
+        let found = picture[3 * centre..][..3].iter().map(|c| c.round()).collect::<Vec<_>>();
         assert_eq!(found, front);
     }
     let behind = draw(&gpu, &scene, &[[0.0, 0.0, 7.0], [0.0, 0.0, 6.0]], Antialias::Samples, 1.0);
@@ -116,16 +115,12 @@ fn nothing_in_view_is_a_picture_too() {
     let (seen, unseen) = ([at(-0.5, 0.0, 0.0), at(0.5, 0.2, 0.0)], [at(0.0, 0.0, 9.0), at(0.0, 1.0, 9.0)]);
     for antialias in [Antialias::None, Antialias::Samples, Antialias::Outlines] {
         let mut frame = gpu.frame(&scene, options(antialias));
-        frame.render(&unseen, Some(1.0)).unwrap();
-        assert!(is_background(&frame.picture()), "{antialias:?}: nothing in the first picture");
-        frame.render(&seen, Some(1.0)).unwrap();
-        let first = frame.picture();
+        assert!(is_background(&shown(&mut frame, &unseen, 1.0)), "{antialias:?}: nothing in the first picture");
+        let first = shown(&mut frame, &seen, 1.0);
         assert!(!is_background(&first), "{antialias:?}: something is seen");
-        frame.render(&unseen, Some(1.0)).unwrap();
-        assert!(is_background(&frame.picture()), "{antialias:?}: nothing is seen any more");
+        assert!(is_background(&shown(&mut frame, &unseen, 1.0)), "{antialias:?}: nothing is seen any more");
         frame.show(&unseen, 1.0).unwrap();
-        frame.render(&seen, Some(1.0)).unwrap();
-        assert!(frame.picture() == first, "{antialias:?}: what comes back is as it was");
+        assert!(shown(&mut frame, &seen, 1.0) == first, "{antialias:?}: what comes back is as it was");
     }
 }
 
@@ -137,13 +132,11 @@ fn batches_change_nothing() {
     let placements = [at(-0.3, 0.0, 0.0), at(0.3, 0.2, 0.5)];
     for antialias in [Antialias::None, Antialias::Samples, Antialias::Outlines] {
         let mut frame = gpu.frame(&scene, options(antialias));
-        frame.render(&placements, Some(1.0)).unwrap();
-        let whole = frame.picture();
+        let whole = shown(&mut frame, &placements, 1.0);
         assert!(whole.iter().any(|c| *c > 0.5));
         for triangles in [1000, 37] {
             frame.set_batch(triangles);
-            frame.render(&placements, Some(1.0)).unwrap();
-            assert!(frame.picture() == whole, "batches of {triangles}, {antialias:?}");
+            assert!(shown(&mut frame, &placements, 1.0) == whole, "batches of {triangles}, {antialias:?}");
         }
     }
 }
@@ -218,10 +211,8 @@ fn slivers_are_no_brighter_than_their_vertices() {
     let scene = scene.build().unwrap();
     let options = options(Antialias::Samples);
     let frames = [gpu.frame(&scene, options), gpu.frame_on(&extrapolating, &scene, options)];
-    let [within, beyond] = frames.map(|mut frame| {
-        frame.render(&scene.at(0.0), Some(f32::INFINITY)).unwrap();
-        frame.picture().into_iter().fold(0.0, f32::max)
-    });
+    let [within, beyond] =
+        frames.map(|mut frame| shown(&mut frame, &scene.at(0.0), f32::INFINITY).into_iter().fold(0.0, f32::max));
     assert!((0.2..most + 1e-3).contains(&within), "{within}");
     assert!(beyond > 2.0 * most, "the slivers are no test: {beyond}");
 }
@@ -301,19 +292,25 @@ fn textures_multiply_the_light_of_a_grey_surface() {
     assert!(compared[0].min(compared[2]).min(compared[3]) > 20, "{compared:?}");
 }
 
+/// A floor with a texture of that many texels along a side, seen in even light.
+fn floor(camera: Camera, corners: [[f32; 3]; 4], side: usize, rgba: Vec<[u8; 4]>) -> Scene {
+    Scene::builder()
+        .camera(camera)
+        .environment(EnvironmentData { uniform: Some(Vec3::ONE), ..EnvironmentData::default() })
+        .texture("paint", Texture { alpha_cutoff: None, ..holed(side, rgba) })
+        .mesh("floor", quad(corners, None))
+        .entity(EntityData { albedo: Albedo::Texture("paint".into()), ..EntityData::of_mesh("floor") })
+        .build()
+        .unwrap()
+}
+
 /// Far from edges a texture looks the same with four samples a pixel as with one, also where it is seen slanted.
 #[test]
 fn textures_are_even_under_four_samples() {
     let Some(gpu) = gpu() else { return };
-    let mesh = quad([[-2.0, -1.0, 2.0], [2.0, -1.0, 2.0], [2.0, 0.5, -8.0], [-2.0, 0.5, -8.0]], None);
-    let rgba = (0..16 * 16).map(|i| [255 * (i as u8 % 2), 255 * (i / 16 % 2) as u8, 0, 255]).collect();
-    let scene = Scene::builder()
-        .camera(Camera::new([0.0, 0.5, 5.0], [0.0, -0.2, 0.0]))
-        .environment(EnvironmentData { uniform: Some(Vec3::ONE), ..EnvironmentData::default() })
-        .texture("checks", Texture { alpha_cutoff: None, ..holed(16, rgba) })
-        .mesh("floor", mesh)
-        .entity(EntityData { albedo: Albedo::Texture("checks".into()), ..EntityData::of_mesh("floor") });
-    let scene = scene.build().unwrap();
+    let corners = [[-2.0, -1.0, 2.0], [2.0, -1.0, 2.0], [2.0, 0.5, -8.0], [-2.0, 0.5, -8.0]];
+    let checks = (0..16 * 16).map(|i| [255 * (i as u8 % 2), 255 * (i / 16 % 2) as u8, 0, 255]).collect();
+    let scene = floor(Camera::new([0.0, 0.5, 5.0], [0.0, -0.2, 0.0]), corners, 16, checks);
     let [one, four] =
         [Antialias::None, Antialias::Samples].map(|antialias| gpu.picture(&scene, options(antialias), f32::INFINITY));
     let mut compared = 0;
@@ -331,16 +328,10 @@ fn textures_are_even_under_four_samples() {
 #[test]
 fn stripes_seen_along_them_stay_apart() {
     let Some(gpu) = gpu() else { return };
-    let mesh = quad([[-2.0, -1.0, 2.0], [2.0, -1.0, 2.0], [2.0, -1.0, -8.0], [-2.0, -1.0, -8.0]], None);
+    let corners = [[-2.0, -1.0, 2.0], [2.0, -1.0, 2.0], [2.0, -1.0, -8.0], [-2.0, -1.0, -8.0]];
     let stripe_m = 0.25;
-    let rgba = (0..64 * 64).map(|i| if i % 64 / 4 % 2 == 0 { [0, 0, 0, 255] } else { [255; 4] }).collect();
-    let scene = Scene::builder()
-        .camera(Camera::new([0.0, -0.7, 5.0], [0.0, -0.7, 0.0]))
-        .environment(EnvironmentData { uniform: Some(Vec3::ONE), ..EnvironmentData::default() })
-        .texture("stripes", Texture { alpha_cutoff: None, ..holed(64, rgba) })
-        .mesh("floor", mesh)
-        .entity(EntityData { albedo: Albedo::Texture("stripes".into()), ..EntityData::of_mesh("floor") });
-    let scene = scene.build().unwrap();
+    let stripes = (0..64 * 64).map(|i| if i % 64 / 4 % 2 == 0 { [0, 0, 0, 255] } else { [255; 4] }).collect();
+    let scene = floor(Camera::new([0.0, -0.7, 5.0], [0.0, -0.7, 0.0]), corners, 64, stripes);
     for antialias in [Antialias::None, Antialias::Samples] {
         let picture = gpu.picture(&scene, options(antialias), f32::INFINITY);
         let mut off = 0.0;

@@ -1,6 +1,6 @@
 //! What the camera cannot see is not drawn, and no picture shows it.
 
-use crate::common::gpu;
+use crate::common::{gpu, shown};
 use crate::stage::{jostled, scene, small};
 use shadow_fields::draw::Antialias;
 use shadow_fields::frame;
@@ -63,8 +63,7 @@ fn pictures_are_the_same_to_the_bit() {
             }
             let pictures = frames.each_mut().map(|frame| {
                 frame.set_camera(&eye(round));
-                frame.render(&placements, Some(1.0)).unwrap();
-                frame.picture().into_iter().map(f32::to_bits).collect::<Vec<u32>>()
+                shown(frame, &placements, 1.0).into_iter().map(f32::to_bits).collect::<Vec<u32>>()
             });
             assert!(pictures[0] == pictures[1], "{antialias:?}, round {round}, {movers:?} moved");
         }

@@ -1,6 +1,6 @@
 //! Rooms that people build and their lamps: pictures beside rays.
 
-use crate::common::{Gpu, generate, gpu, inside_out, of_cells, of_quads, part, relative_rms};
+use crate::common::{Gpu, generate, gpu, inside_out, of_cells, of_quads, part, relative_rms, reshaped};
 use crate::stage::{shines, stands};
 use glam::{DQuat, Vec2, Vec3};
 use shadow_fields::asset::Mesh;
@@ -388,13 +388,9 @@ fn several_lamps_leave_a_table_its_shadow() {
 /// A slab of a roof lies on a gable: the box around this reaches to above the slab, its faces do not (0.34).
 #[test]
 fn a_gable_casts_no_shadow_on_the_roof_above_it() {
-    let bent = |place: fn(Vec3) -> Vec3| {
-        let solid = generate::cuboid(Vec3::ONE, 1);
-        let places = solid.positions.iter().map(|p| place(*p)).collect();
-        Mesh::new("bent", places, Vec::new(), None, solid.triangles).unwrap()
-    };
-    let gable = bent(|p| Vec3::new(4.0 * p.x * (0.5 - p.y), 0.9 * (0.5 + p.y), 6.0 * p.z));
-    let slab = bent(|p| Vec3::new(2.0 * (0.5 + p.x), 0.9 * (0.5 - p.x) + 0.1 * (0.5 + p.y), 6.0 * p.z));
+    let solid = generate::cuboid(Vec3::ONE, 1);
+    let gable = reshaped(&solid, |p| Vec3::new(4.0 * p.x * (0.5 - p.y), 0.9 * (0.5 + p.y), 6.0 * p.z));
+    let slab = reshaped(&solid, |p| Vec3::new(2.0 * (0.5 + p.x), 0.9 * (0.5 - p.x) + 0.1 * (0.5 + p.y), 6.0 * p.z));
     assert!(gable.is_convex() && slab.is_convex());
     let scene = Scene::builder()
         .camera(Camera::new([4.0, 4.0, 4.0], [0.0, 0.4, 0.0]))

@@ -1,6 +1,6 @@
 //! What the merged light must be, whatever the implementation: closed forms, symmetries, continuity. All on the device.
 
-use crate::common::{Gpu, gpu};
+use crate::common::gpu;
 use crate::stage::{self, at, difference, scene, small};
 use glam::{DVec3, Quat, Vec3};
 use shadow_fields::lists::skip::Skip;
@@ -25,10 +25,6 @@ fn entity(mesh: &str, more: &str) -> String {
     format!("[[entity]]\nmesh = \"{mesh}\"\nalbedo = [1, 1, 1]\n{more}\n")
 }
 
-fn lit(scene: &Scene, options: frame::Options, gpu: &Gpu) -> Vec<Vec<[f32; 3]>> {
-    gpu.light(&mut gpu.frame(scene, options), &scene.at(0.0))
-}
-
 #[test]
 fn white_furnace() {
     let Some(gpu) = gpu() else { return };
@@ -41,7 +37,7 @@ fn white_furnace() {
         }
     }
     let scene = scene(&text);
-    let light = lit(&scene, small(), &gpu);
+    let light = gpu.lit(&scene, small());
     assert_eq!(light.len(), 27);
     let worst = light.iter().flatten().flatten().fold(0.0_f32, |m, b| m.max((b - 1.0).abs()));
     assert!(worst < 1e-3, "{worst:e}");
@@ -159,7 +155,7 @@ fn one_motion_and_size_of_everything_changes_nothing() {
     let key = Vec3::new(0.4, 1.0, 0.3).normalize();
     let rest = group(key);
     let placements = rest.at(0.0);
-    let before = lit(&rest, small(), &gpu);
+    let before = gpu.lit(&rest, small());
     // An odd angle; a third of a turn about (1, 1, 1), which carries the axes into each other; and other sizes.
     let shift = Vec3::new(37.3, -21.7, 55.1);
     for (axis, angle, shift, scale) in [
@@ -188,7 +184,7 @@ fn size_of_meshes_does_not_matter() {
         let mesh = format!("[[mesh]]\nname = \"m\"\nsphere = {{ radius_m = {radius_m}, subdivisions = 2 }}\n");
         let ball = entity("m", &format!("scale = {scale}\nposition = [0.3, 1.4, 0.2]"));
         let scene = stage::scene(&format!("{WHITE_SKY}{PATCH}{mesh}{}{ball}", entity("patch", "")));
-        lit(&scene, small(), &gpu).remove(0)
+        gpu.lit(&scene, small()).remove(0)
     };
     let (worst, _) = difference(&of(1.0, 1.0), &of(1000.0, 0.001));
     assert!(worst < 1e-4, "{worst:e}");

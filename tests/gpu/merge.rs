@@ -1,6 +1,6 @@
 //! The merge on the device against its twin in f64, which reads the same stored numbers; and the barriers of a frame.
 
-use crate::common::{Gpu, gpu, open};
+use crate::common::{Gpu, gpu, open, shown};
 use crate::stage::{difference, scene, small};
 use shadow_fields::asset::{Generator, embedded};
 use shadow_fields::bake::Baker;
@@ -98,7 +98,7 @@ fn emitters_that_occlude_and_receive() {
     assert!(sum(&open[1]) > 0.0 && sum(&open[2]) > 0.0, "lights are lit by each other");
 
     let alone = scene(&format!("{FLOOR_AND_BALL}{}", entity("position = [0, 0.9, 0]\nemission = [9, 7, 5]")));
-    let light = gpu.light(&mut gpu.frame(&alone, small()), &alone.at(0.0));
+    let light = gpu.lit(&alone, small());
     assert!(light[1].iter().flatten().all(|b| *b == 0.0), "nothing is lit by its own light");
     assert!(sum(&light[0]) > 0.0);
 }
@@ -165,8 +165,7 @@ fn lists_too_long_for_texel_views() {
     let (scene, base) = crowd();
     let placements = scene.at(0.0);
     let variant = |name: &str| Some(Variant::named(name).unwrap());
-    let expected =
-        gpu.light(&mut gpu.frame(&scene, frame::Options { variant: variant("storage"), ..base }), &placements);
+    let expected = gpu.lit(&scene, frame::Options { variant: variant("storage"), ..base });
     let device = short_views();
     let baker = Baker::new(&device, &gpu.library);
     for name in ["texel-packed", "texel-shifted"] {
@@ -191,8 +190,7 @@ fn chains_too_long_for_texel_views() {
     let picture = |baker: Option<&Baker>, shading: Shading| {
         let options = frame::Options { shading: Some(shading), size: [96, 64], ..base };
         let mut frame = baker.map_or_else(|| gpu.frame(&scene, options), |baker| gpu.frame_on(baker, &scene, options));
-        frame.render(&scene.at(0.0), Some(1.0)).unwrap();
-        frame.picture()
+        shown(&mut frame, &scene.at(0.0), 1.0)
     };
     let by_vertex = picture(Some(&baker), Shading::Vertex);
     assert!(picture(Some(&baker), Shading::Pixel) == by_vertex, "vertices evaluate the light");

@@ -1,6 +1,6 @@
 //! The front door: scenes made in code, light and pictures by `Renderer`, and what it refuses.
 
-use crate::common::{gpu, parse};
+use crate::common::{gpu, parse, shown};
 use crate::stage::{shines, stands};
 use glam::{Quat, Vec3};
 use shadow_fields::asset::environment::EnvironmentData;
@@ -94,8 +94,7 @@ fn light_and_picture_are_those_of_a_frame() {
         placements[1].position.x += 0.2 * step as f32;
         placements[1].rotation = Quat::from_rotation_x(0.4 * step as f32);
         renderer.update(&placements).unwrap();
-        frame.render(&placements, Some(white)).unwrap();
-        let expected = frame.picture();
+        let expected = shown(&mut frame, &placements, white);
         frame.render(&placements, None).unwrap();
         for entity in 0..3 {
             let light = &renderer.light().unwrap()[entity];

@@ -29,8 +29,7 @@ fn glass_takes_its_share() {
                     let pane = format!("[[entity]]\nmesh = \"{mesh}\"\nposition = [0.1, 0.8, 0]\n{switch}\n");
                     let bake = bake::Options { groups, ..small().bake };
                     let scene = scene(&format!("{sky}{FLOOR}{pane}{light}"));
-                    let options = frame::Options { bake, ..small() };
-                    gpu.light(&mut gpu.frame(&scene, options), &scene.at(0.0)).swap_remove(0)
+                    gpu.lit(&scene, frame::Options { bake, ..small() }).swap_remove(0)
                 };
                 // An opaque one of a group would be in the floor's own visibility.
                 let [open, glass, dense] = ["occludes = false", "opacity = 0.3", "opacity = 0.999"].map(lit);
@@ -92,10 +91,8 @@ fn light_passes_holes() {
     let Some(gpu) = gpu() else { return };
     for (groups, limit) in [(true, 0.06), (false, 0.12)] {
         let lit = |masked: bool| {
-            let scene = half_of_a_square(masked);
             let bake = bake::Options { groups, ..bake::Options::default() };
-            let mut frame = gpu.frame(&scene, frame::Options { bake, ..small() });
-            gpu.light(&mut frame, &scene.at(0.0)).swap_remove(0)
+            gpu.lit(&half_of_a_square(masked), frame::Options { bake, ..small() }).swap_remove(0)
         };
         let (off, most) = difference(&lit(true), &lit(false));
         assert!(off < limit * most, "groups {groups}: {off} of {most}");

@@ -1,6 +1,6 @@
 //! Solids with square corners as boxes.
 
-use crate::common::{generate, of_cells};
+use crate::common::{generate, of_cells, reshaped};
 use glam::{DVec3, Quat, Vec3};
 use shadow_fields::asset::Mesh;
 use shadow_fields::field::cuboid::PlacedCuboid;
@@ -28,10 +28,8 @@ fn boxes_fill_a_solid_and_overlap() {
         Vec3::from_array([0, 1, 2].map(|axis| ends(axis).iter().sum::<f32>() / 2.0))
     };
     for (wanted, most) in solids {
-        let solid = of_cells(PLANES, wanted);
-        let places = solid.positions.iter().map(|p| placed(*p)).collect();
-        let turned = Mesh::new("turned", places, Vec::new(), None, solid.triangles).unwrap();
-        let boxes = turned.boxes();
+        let solid = reshaped(&of_cells(PLANES, wanted), placed);
+        let boxes = solid.boxes();
         assert!((2..=most).contains(&boxes.len()), "{} boxes", boxes.len());
         for cell in (0..75).map(|i| [i / 15, i / 3 % 5, i % 3]) {
             let within = |place: Vec3| boxes.iter().any(|solid| holds(solid, placed(place).as_dvec3()));
@@ -52,12 +50,8 @@ fn boxes_fill_a_solid_and_overlap() {
 #[test]
 fn other_solids_have_no_boxes() {
     let stairs = of_cells(PLANES, |[x, y, _]| y <= x);
-    let moved = |place: fn(Vec3) -> Vec3| {
-        let places = stairs.positions.iter().map(|p| place(*p)).collect();
-        Mesh::new("moved", places, Vec::new(), None, stairs.triangles.clone()).unwrap()
-    };
-    let skewed = moved(|p| Vec3::new(p.x + 0.1 * p.y, p.y, p.z));
-    let wedge = moved(|p| Vec3::new(p.x, p.y * (2.0 + 0.1 * p.z), p.z));
+    let skewed = reshaped(&stairs, |p| Vec3::new(p.x + 0.1 * p.y, p.y, p.z));
+    let wedge = reshaped(&stairs, |p| Vec3::new(p.x, p.y * (2.0 + 0.1 * p.z), p.z));
     let open = Mesh::new("open", stairs.positions.clone(), Vec::new(), None, stairs.triangles[2..].to_vec()).unwrap();
     for mesh in [skewed, wedge, open, generate::torus(1.0, 0.3, 12, 6), generate::cuboid(Vec3::ONE, 2)] {
         assert!(mesh.boxes().is_empty(), "{}", mesh.name);

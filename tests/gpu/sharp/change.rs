@@ -1,7 +1,7 @@
 //! What a frame with sharp lights shows once an entity, a light or the way to smooth edges is switched.
 
 use super::{HEAD, parse, scenes};
-use crate::common::gpu;
+use crate::common::{gpu, shown};
 use shadow_fields::check::sharp as check;
 use shadow_fields::draw::{Antialias, Shading};
 use shadow_fields::frame::{self, Frame};
@@ -19,10 +19,7 @@ fn pixels_follow_switches_of_entities() {
         ..check::sharp_options()
     };
     let new = |scene: &Scene| gpu.frame(scene, options);
-    let show = |frame: &mut Frame| {
-        frame.render(&scene.at(0.0), Some(4.0)).unwrap();
-        frame.picture()
-    };
+    let show = |frame: &mut Frame| shown(frame, &scene.at(0.0), 4.0);
     let mut bare = scene.clone();
     bare.entities[1].occludes = false;
     let mut frame = new(&scene);

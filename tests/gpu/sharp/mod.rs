@@ -13,11 +13,10 @@ use shadow_fields::truth::{RayCast, World, sample_vertices};
 
 /// Relative root mean square error of the light on vertices against rays.
 fn error(gpu: &Gpu, scene: &Scene, options: frame::Options, rays: u32) -> f64 {
-    let placements = scene.at(0.0);
-    let light = gpu.light(&mut gpu.frame(scene, options), &placements);
+    let light = gpu.lit(scene, options);
     let vertices = sample_vertices(scene, 800, 3);
     let cast = RayCast { rays, runs: 2, ..Default::default() };
-    against_rays(&light, &vertices, &cast.run(&World::of(scene, &placements), &vertices))
+    against_rays(&light, &vertices, &cast.run(&World::of(scene, &scene.at(0.0)), &vertices))
 }
 
 const HEAD: &str = "[camera]\neye = [0, 2, 5]\ntarget = [0, 0.5, 0]\n\

@@ -2,11 +2,10 @@
 
 use super::common;
 use super::targets::{NAME, framed, unframed, with_file};
-use shadow_fields::Result;
-use shadow_fields::error::Error;
 use shadow_fields::farm::Plan;
 use shadow_fields::farm::engines::{self, Call};
 use shadow_fields::farm::results::{self, SliceResult, missing};
+use shadow_fields::{Error, Result};
 use std::path::{Path, PathBuf};
 
 pub const TOKENS: &str = "\

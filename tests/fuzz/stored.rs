@@ -4,11 +4,10 @@ use super::common::generate;
 use super::targets::{NAME, framed, unframed, with_file};
 use glam::DVec3;
 use serde::de::DeserializeOwned;
-use shadow_fields::error::Error;
 use shadow_fields::field::file::{self, FIELD_MAGIC};
 use shadow_fields::field::silhouette::{SILHOUETTE_MAGIC, SilhouetteField, SilhouetteHeader};
 use shadow_fields::field::{FieldKind, ShadowField, Storage};
-use shadow_fields::{Result, bake};
+use shadow_fields::{Error, Result, bake};
 use std::path::Path;
 
 /// What `write` writes.

@@ -2,12 +2,11 @@
 
 use super::{farm, stored};
 use glam::DVec3;
-use shadow_fields::Result;
 use shadow_fields::asset::equirect::Equirect;
 use shadow_fields::asset::{Mesh, embedded, picture};
-use shadow_fields::error::Error;
 use shadow_fields::field::file::VERSION;
 use shadow_fields::scene::{Scene, gltf};
+use shadow_fields::{Error, Result};
 use std::path::Path;
 
 /// A parser, what it says to an input, and words of its format.

@@ -7,10 +7,9 @@ use model::{Model, U8, cuboid, load};
 use serde_json::json;
 use shadow_fields::asset::Mesh;
 use shadow_fields::asset::picture::{linear_from_srgb, write_png};
-use shadow_fields::bake;
-use shadow_fields::frame;
 use shadow_fields::scene::{Gloss, Maps, Scene};
 use shadow_fields::truth::{RayCast, Vertex, World};
+use shadow_fields::{bake, frame};
 
 /// A square of 2 x 2 m with coordinates of textures, of a material that is no metal unless it says so.
 fn square(model: &mut Model, mut material: serde_json::Value, with_uv: bool) -> usize {

@@ -6,10 +6,8 @@ use glam::Vec3;
 use shadow_fields::asset::Mesh;
 use shadow_fields::asset::environment::EnvironmentData;
 use shadow_fields::bounce::Bounces;
-use shadow_fields::scene::data::EntityData;
-use shadow_fields::scene::{Lights, Motion, Scene, SceneBuilder};
-use shadow_fields::truth::raycast::RayCast;
-use shadow_fields::truth::{Estimate, Vertex, World, receiver_vertices};
+use shadow_fields::scene::{EntityData, Lights, Motion, Scene, SceneBuilder};
+use shadow_fields::truth::{Estimate, RayCast, Vertex, World, receiver_vertices};
 use shadow_fields::{bake, frame};
 
 const ALBEDO: f32 = 0.6;

@@ -12,8 +12,7 @@ use shadow_fields::check::sharp::sharp_options;
 use shadow_fields::draw::Antialias;
 use shadow_fields::draw::camera::through_pixels;
 use shadow_fields::frame;
-use shadow_fields::scene::data::{Camera, EntityData};
-use shadow_fields::scene::{Albedo, Placement, Scene};
+use shadow_fields::scene::{Albedo, Camera, EntityData, Placement, Scene};
 use shadow_fields::shaders::Library;
 
 const WIDTH: usize = 96;

@@ -2,15 +2,13 @@
 
 use super::common::{gpu, parse, relative_rms, report, shown};
 use glam::DVec3;
-use shadow_fields::bake;
 use shadow_fields::bounce::Bounces;
 use shadow_fields::draw::{Antialias, Shading};
-use shadow_fields::frame;
 use shadow_fields::gloss::lobe;
 use shadow_fields::scene::Scene;
 use shadow_fields::truth::pixels::{self, RayPicture};
-use shadow_fields::truth::raycast::RayCast;
-use shadow_fields::truth::world::World;
+use shadow_fields::truth::{RayCast, World};
+use shadow_fields::{bake, frame};
 
 const SIZE: [u32; 2] = [96, 64];
 const CAMERA: &str = "[camera]\neye = [0, 0.8, 4]\ntarget = [0, 0.2, 0]\nfov_deg = 40\n";

@@ -3,19 +3,14 @@
 use crate::common::{Gpu, generate, gpu, inside_out, of_cells, of_quads, part, relative_rms, reshaped};
 use crate::stage::{shines, stands};
 use glam::{DQuat, Vec2, Vec3};
-use shadow_fields::asset::Mesh;
 use shadow_fields::asset::disc::Sun;
 use shadow_fields::asset::environment::EnvironmentData;
-use shadow_fields::asset::generate::Generator;
-use shadow_fields::bake;
+use shadow_fields::asset::{Generator, Mesh};
 use shadow_fields::bounce::Bounces;
-use shadow_fields::frame;
-use shadow_fields::scene::data::EntityData;
-use shadow_fields::scene::motion::{Motion, Node, RotationData};
-use shadow_fields::scene::{Camera, Scene, SceneBuilder};
-use shadow_fields::truth::pixels;
-use shadow_fields::truth::raycast::RayCast;
-use shadow_fields::truth::world::World;
+use shadow_fields::scene::motion::{Node, RotationData};
+use shadow_fields::scene::{Camera, EntityData, Motion, Scene, SceneBuilder};
+use shadow_fields::truth::{RayCast, World, pixels};
+use shadow_fields::{bake, frame};
 use std::f32::consts::TAU;
 
 /// Pixels of pictures beside rays.

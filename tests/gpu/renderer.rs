@@ -5,9 +5,7 @@ use crate::stage::{shines, stands};
 use glam::{Quat, Vec3};
 use shadow_fields::asset::environment::EnvironmentData;
 use shadow_fields::frame::Frame;
-use shadow_fields::gpu::Gpu;
-use shadow_fields::prelude::{Cache, Camera, EntityData, Error, Generator, Quality};
-use shadow_fields::prelude::{Placement, RenderOptions, Renderer, Scene};
+use shadow_fields::prelude::*;
 use shadow_fields::scene::{Lights, Output, SceneBuilder};
 
 /// A floor, a box that turns on it and a lamp under a grey sky.

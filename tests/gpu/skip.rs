@@ -7,8 +7,7 @@ use shadow_fields::asset::Mesh;
 use shadow_fields::frame;
 use shadow_fields::lists::skip::{Skip, TABLE};
 use shadow_fields::scene::{Placement, Scene};
-use shadow_fields::truth::raycast::RayCast;
-use shadow_fields::truth::{Vertex, World};
+use shadow_fields::truth::{RayCast, Vertex, World};
 use std::fmt::Write;
 
 /// Balls and rings on a floor, some of them lights, on a grid with `step_m` between them.

@@ -7,8 +7,7 @@ use shadow_fields::asset::environment::EnvironmentData;
 use shadow_fields::asset::mesh::Attributes;
 use shadow_fields::asset::{Generator, Mesh};
 use shadow_fields::draw::Antialias;
-use shadow_fields::scene::data::EntityData;
-use shadow_fields::scene::{Albedo, Scene};
+use shadow_fields::scene::{Albedo, EntityData, Scene};
 use shadow_fields::{bake, frame};
 
 const SKY: &str = "environment = { uniform = [1, 1, 1] }\n";

@@ -1,11 +1,10 @@
 //! Those who watch are watched: the layer hears a hazard, the tracker misses a barrier of a bake.
 
 use crate::common::{Gpu, generate, gpu};
-use shadow_fields::Error;
-use shadow_fields::bake;
 use shadow_fields::bake::assemble::Assemble;
 use shadow_fields::field::{FieldKind, Storage};
 use shadow_fields::gpu::{Buffer, BufferKind, Commands};
+use shadow_fields::{Error, bake};
 
 fn buffer(gpu: &Gpu, name: &str) -> Buffer {
     Buffer::new(&gpu.device, name, BufferKind::Device, 1024).unwrap()

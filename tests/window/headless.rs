@@ -5,9 +5,8 @@ use crate::stand::{SIZE, Stand};
 use shadow_fields::bake;
 use shadow_fields::draw::Antialias;
 use shadow_fields::scene::{Lights, Scene};
-use shadow_fields::view::command::Command;
-use shadow_fields::view::input::{Button, Event, Key};
-use shadow_fields::view::{Previewed, Setup, Viewer};
+use shadow_fields::view::input::{Button, Key};
+use shadow_fields::view::{Command, Event, Previewed, Setup, Viewer};
 use std::collections::HashSet;
 use std::time::Duration;
 

@@ -8,9 +8,8 @@ use shadow_fields::bake::cache::Cache;
 use shadow_fields::frame::{self, Frame};
 use shadow_fields::gpu::{self, FLIGHTS, Image, ImageShape, Validation};
 use shadow_fields::scene::Scene;
-use shadow_fields::view::command::Command;
-use shadow_fields::view::input::{Button, Event, Key};
-use shadow_fields::view::{Editor, FrameTarget, Setup, Viewer};
+use shadow_fields::view::input::{Button, Key};
+use shadow_fields::view::{Command, Editor, Event, FrameTarget, Setup, Viewer};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 

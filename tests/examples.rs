@@ -80,11 +80,8 @@ fn examples_build_from_an_empty_project_and_run() {
     let programs = build(folder.path());
 
     let lines = run(&programs.join("own_device"), &[], folder.path());
-    assert_eq!(
-        lines.lines().filter(|line| line.starts_with("step ") && line.contains(" vertices, ")).count(),
-        3,
-        "{lines}"
-    );
+    let is_step = |line: &&str| line.starts_with("step ") && line.contains(" vertices, ");
+    assert_eq!(lines.lines().filter(is_step).count(), 3, "{lines}");
 
     run(&programs.join("picture"), &["p.png"], folder.path());
     let picture = Picture::read(&folder.path().join("p.png")).unwrap();

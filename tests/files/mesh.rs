@@ -34,12 +34,8 @@ fn shape_table() {
         (cuboid(Vec3::new(0.3, 1.0, 2.5), 6), true, true, false, 2),
     ];
     for (mesh, closed, convex, flat, euler) in table {
-        assert_eq!(
-            (mesh.is_closed(), mesh.is_convex(), mesh.is_flat(), mesh.euler_characteristic()),
-            (closed, convex, flat, euler),
-            "{}",
-            mesh.name
-        );
+        let found = (mesh.is_closed(), mesh.is_convex(), mesh.is_flat(), mesh.euler_characteristic());
+        assert_eq!(found, (closed, convex, flat, euler), "{}", mesh.name);
     }
     assert!(!teapot().is_closed() && !teapot().is_convex() && !teapot().is_flat());
 }
@@ -244,11 +240,8 @@ fn obj_dialects() {
     let textured =
         parse("v 0 0 0\nv 1 0 0\nv 0 1 0\nv 1 1 0\nvt 0\nvt .5 1\nvt 1 0 0\nf 1/1 2/2 3/3\nf 4/-3 3/3 2/1\n");
     let uvs = textured.uvs.as_ref().unwrap();
-    assert_eq!(
-        uvs[..],
-        [[0.0, 0.0], [0.5, 1.0], [1.0, 0.0], [0.0, 0.0], [0.0, 0.0]].map(Vec2::from),
-        "a seam splits a vertex"
-    );
+    let wanted = [[0.0, 0.0], [0.5, 1.0], [1.0, 0.0], [0.0, 0.0], [0.0, 0.0]].map(Vec2::from);
+    assert_eq!(uvs[..], wanted, "a seam splits a vertex");
     assert!(parse("v 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nf 1/1 2/1 3\n").uvs.is_none(), "one corner has none");
     let split = parse("v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nvn 0 0 2\nvn 0 1 0\nf 1//1 2//1 3//1\nf 1//2 4//2 2//2\n");
     assert_eq!((split.positions.len(), split.normals[0]), (6, Vec3::Z), "two normals at two of the positions");

@@ -123,10 +123,8 @@ fn instances_stand_where_their_attributes_say() {
     model.json["extensionsRequired"] = json!(["EXT_mesh_gpu_instancing"]);
     let import = load(&model);
     let entities = &import.data.entities;
-    assert_eq!(
-        entities.iter().map(|e| e.name.as_deref().unwrap()).collect::<Vec<_>>(),
-        ["tree", "tree", "tree", "nest"]
-    );
+    let names: Vec<&str> = entities.iter().map(|e| e.name.as_deref().unwrap()).collect();
+    assert_eq!(names, ["tree", "tree", "tree", "nest"]);
     for (i, entity) in entities[..3].iter().enumerate() {
         assert_eq!(entity.position, Vec3::new(2.0 * i as f32, 1.0, 0.0));
     }

@@ -88,10 +88,6 @@ fn an_imported_scene_has_the_same_textures_and_parts() {
     let texture = &scene.data.textures[0];
     assert_eq!((texture.name.as_str(), texture.image, texture.alpha_cutoff), ("leaf", Some(0), Some(0.5)));
     let text = scene.to_toml().unwrap();
-    assert!(
-        text.contains("albedo = \"leaf\"") && text.contains("part = [0, 0]") && text.contains("bend = ["),
-        "{text}"
-    );
     let saved = folder.path().join("saved.toml");
     std::fs::write(&saved, &text).unwrap();
     let again = Scene::load(&saved).unwrap();

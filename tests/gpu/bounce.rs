@@ -225,14 +225,11 @@ fn light_bounces_through_a_door_and_not_through_walls() {
     let mesh = scene.surface(0);
     let dark: Vec<Vertex> = dark_vertices(scene).into_iter().step_by(5).collect();
     let rays = by_rays(scene, &dark, 2048, 1);
-    let sums = |of: &dyn Fn(usize) -> f64| (0..dark.len()).map(of).sum::<f64>();
+    let count = dark.len();
+    let sums = |of: &dyn Fn(usize) -> f64| (0..count).map(of).sum::<f64>();
     let found = sums(&|i| f64::from(light[0][dark[i].index][0]));
     let wanted = sums(&|i| rays[i].radiosity[0]);
-    assert!(
-        dark.len() > 50 && (found / wanted - 1.0).abs() < 0.3,
-        "{} vertices: {found}, by rays {wanted}",
-        dark.len()
-    );
+    assert!(count > 50 && (found / wanted - 1.0).abs() < 0.3, "{count} vertices: {found}, by rays {wanted}");
     // The lintel covers the upper part of the jamb. Triangles that reach below it are seen, and none has a black corner.
     let jamb = scene.surface(1);
     let seen = jamb.triangles.iter().filter(|triangle| {

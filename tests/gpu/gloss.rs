@@ -69,11 +69,8 @@ fn a_white_metal_vanishes_in_a_furnace() {
         let single = gpu.picture(&scene, frame::Options { single_scatter: true, ..options() }, f32::INFINITY);
         let middle = single[3 * (SIZE[0] * SIZE[1] / 2 + SIZE[0] / 2) as usize];
         // The pixel in the middle sees the ball at a cosine of 0.94 or more.
-        let range = [0.93, 1.0].map(|z| lobe::energy(roughness, z) as f32);
-        assert!(
-            middle > range[0].min(range[1]) - 0.02 && middle < range[0].max(range[1]) + 0.02,
-            "{roughness}: {middle}"
-        );
+        let [a, b] = [0.93, 1.0].map(|z| lobe::energy(roughness, z) as f32);
+        assert!(middle > a.min(b) - 0.02 && middle < a.max(b) + 0.02, "{roughness}: {middle}");
     }
     // A dielectric neither adds nor loses light that can be seen, but at grazing angles, where light that microfacets
     // pass on to each other is counted a second time by the diffuse part.

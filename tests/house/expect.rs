@@ -62,10 +62,8 @@ fn lists_and_outputs_of_every_kind() {
         ("b*\n", TAP, 1, &tap),
     ] {
         let (found, said) = expect(list, log);
-        assert!(
-            found == code && lines.iter().all(|line| said.iter().any(|said| said == line)),
-            "{list}: {found} {said:?}"
-        );
+        let is_said = lines.iter().all(|line| said.iter().any(|said| said == line));
+        assert!(found == code && is_said, "{list}: {found} {said:?}");
     }
     for words in [&["no such list", "/dev/null"][..], &[]] {
         let missing = Command::new(root().join("scripts/expect")).args(words).output().unwrap();

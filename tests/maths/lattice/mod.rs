@@ -62,10 +62,7 @@ fn faces_share_the_samples_on_their_edges() {
     for cells in [1, 3, 7] {
         let lattice: Lattice = format!("cube:3x{cells},edges,inner=0.5").parse().unwrap();
         let columns = cells + 2;
-        assert_eq!(
-            (lattice.direction_count(), lattice.stored_direction_count()),
-            (6 * columns * columns, 6 * columns * columns)
-        );
+        assert_eq!([lattice.direction_count(), lattice.stored_direction_count()], [6 * columns * columns; 2]);
         let firsts: Vec<u32> = (0..lattice.direction_count()).filter(|&i| lattice.first_of(i) == i).collect();
         assert_eq!(firsts.len() as u32, 6 * cells * cells + 12 * cells + 8, "faces, edges, corners");
         for i in 0..lattice.direction_count() {
@@ -79,20 +76,16 @@ fn faces_share_the_samples_on_their_edges() {
             // Neighbours are a step away, and those of a pair on opposite sides, save where three faces meet.
             let around = lattice.cell_neighbours(a);
             let step = 90.0 / f64::from(cells + 1);
-            assert!(
-                around.iter().all(|b| (0.6 * step..1.3 * step).contains(&apart(b).to_degrees())),
-                "{cells}: {a} {around:?}"
-            );
+            let is_near = |b: &u32| (0.6 * step..1.3 * step).contains(&apart(b).to_degrees());
+            assert!(around.iter().all(is_near), "{cells}: {a} {around:?}");
             let corner = lattice.direction(a).abs().min_element() > 0.577;
             for pair in around.chunks_exact(2) {
                 let [u, v] = [pair[0], pair[1]].map(|b| lattice.direction(b) - lattice.direction(a));
                 let angle = u.angle_between(v).to_degrees();
                 assert!(angle > 95.0, "{cells}: {a} {pair:?}: {angle}");
             }
-            assert!(
-                corner || (0..4).all(|i| around[i + 1..].iter().all(|b| *b != around[i])),
-                "{cells}: {a} {around:?}"
-            );
+            let is_twice = |i: usize| around[i + 1..].contains(&around[i]);
+            assert!(corner || !(0..4).any(is_twice), "{cells}: {a} {around:?}");
         }
     }
     let chosen: Lattice = "cube:6x5,edges".parse().unwrap();

@@ -34,7 +34,7 @@ const COMMANDS: [(&str, &[&str]); 6] = [
 /// A folder for a command's outputs, with its inputs.
 fn place(inside: &Path, name: &str) -> PathBuf {
     let folder = inside.join(name);
-    room::write(&folder, [24, 16], "motion = [{ spin = { period_s = 3 } }]");
+    room::write(&folder, [24, 16], ", motion = [{ spin = { period_s = 3 } }]");
     std::fs::write(folder.join("m.obj"), MESH).unwrap();
     model::robot().write_embedded(&folder, "t");
     folder
@@ -72,7 +72,6 @@ impl Good {
         Good { outputs, took, inside }
     }
 
-    /// Every output in the folder is whole.
     fn assert_whole(&self, folder: &Path, all_of: Option<usize>) {
         for (name, whole) in &self.outputs {
             if let Ok(bytes) = std::fs::read(folder.join(name)) {

@@ -4,7 +4,7 @@
 
 use std::path::{Path, PathBuf};
 
-/// Its text for pictures of a size, with more keys of the lamp.
+/// Its text for pictures of a size, with more keys of the lamp, each behind a comma.
 pub fn text([width, height]: [u32; 2], of_the_lamp: &str) -> String {
     format!(
         r#"
@@ -15,20 +15,11 @@ mesh = [
     {{ name = "floor", plane = {{ size_m = 6, cells = 24 }} }},
     {{ name = "ball", sphere = {{ radius_m = 0.6, subdivisions = 2 }} }},
 ]
-[[entity]]
-name = "floor"
-mesh = "floor"
-position = [0, -0.6, 0]
-[[entity]]
-name = "ball"
-mesh = "ball"
-[[entity]]
-name = "lamp"
-mesh = "ball"
-position = [1.4, 1.1, 0]
-scale = 0.3
-emission = [30, 24, 12]
-{of_the_lamp}
+entity = [
+    {{ name = "floor", mesh = "floor", position = [0, -0.6, 0] }},
+    {{ name = "ball", mesh = "ball" }},
+    {{ name = "lamp", mesh = "ball", position = [1.4, 1.1, 0], scale = 0.3, emission = [30, 24, 12]{of_the_lamp} }},
+]
 "#
     )
 }

@@ -1,9 +1,9 @@
 //! A real window on a virtual display: a key of each kind, resizing, minimising, a screenshot against `render`, a clean end.
 
 use crate::cli::{COARSE, Folder, finish};
-use crate::viewing::{OPTIONS, PATIENCE, SIZE, View, desk, open};
+use crate::viewing::{OPTIONS, SIZE, View, desk, open, until};
 use crate::{model, room};
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 #[test]
 fn a_window_does_what_its_controls_say() {
@@ -82,11 +82,7 @@ fn a_gltf_file_moves_in_the_window() {
     // Once the first picture is there, another follows.
     for _ in 0..2 {
         let first = display.look(SIZE);
-        let end = Instant::now() + PATIENCE;
-        while room::apart(&first, &display.look(SIZE)) <= 50 {
-            assert!(Instant::now() < end, "nothing moves in the window");
-            std::thread::sleep(Duration::from_millis(100));
-        }
+        until("nothing moves in the window", 100, || room::apart(&first, &display.look(SIZE)) > 50);
     }
     assert!(folder.names().iter().all(|name| !name.ends_with(".toml")), "no scene file was written");
     view.close();

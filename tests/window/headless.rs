@@ -110,7 +110,7 @@ fn a_bake_shows_its_light_before_it_ends() {
         setup.frame.bake = bake::Options { groups: true, face_px: 128, ..bake::Options::default() };
         setup.frame.lights = Lights::Sharp;
     };
-    let motion = "motion = [{ spin = { period_s = 3 } }]";
+    let motion = ", motion = [{ spin = { period_s = 3 } }]";
     let Some(mut stand) = Stand::of("lit", motion, finer) else { return };
     stand.until("light", |viewer| viewer.previewed == Previewed::Light || viewer.frame.is_some());
     assert!(stand.viewer.frame.is_none() && stand.viewer.is_baking(), "the whole was baked before");

@@ -11,10 +11,19 @@ use std::time::{Duration, Instant};
 
 pub const SIZE: [usize; 2] = [480, 320];
 /// How the lamp moves while the scene runs.
-pub const MOTION: &str = "motion = [{ bob = { amplitude_m = 0.2, period_s = 3 } }]";
+pub const MOTION: &str = ", motion = [{ bob = { amplitude_m = 0.2, period_s = 3 } }]";
 /// The window's size, and samples as `render` takes them.
 pub const OPTIONS: &str = "--size 480x320 --no-overlay --antialias samples --validation sync";
 pub const PATIENCE: Duration = Duration::from_secs(60);
+
+/// Waits until `done`, with a pause between questions; panics with what is wrong.
+pub fn until(wrong: &str, pause_ms: u64, mut done: impl FnMut() -> bool) {
+    let end = Instant::now() + PATIENCE;
+    while !done() {
+        assert!(Instant::now() < end, "{wrong}");
+        std::thread::sleep(Duration::from_millis(pause_ms));
+    }
+}
 
 /// A folder and a display; `None` where a device or the display is missing.
 pub fn desk() -> Option<(Folder, Display)> {
@@ -44,11 +53,7 @@ impl<'d> View<'d> {
         });
         let mut view = View { display, child: Running(child), lines, heard: Vec::new(), window: String::new() };
         view.hears("the first picture");
-        let end = Instant::now() + PATIENCE;
-        while display.look(SIZE).windows(2).all(|pair| pair[0] == pair[1]) {
-            assert!(Instant::now() < end, "the window is of one colour");
-            std::thread::sleep(Duration::from_millis(50));
-        }
+        until("the window is of one colour", 50, || display.look(SIZE).windows(2).any(|pair| pair[0] != pair[1]));
         view.window = display.xdotool(&["search", "--name", "shadow-fields"]).trim().to_owned();
         display.xdotool(&["windowfocus", "--sync", &view.window]);
         view
@@ -89,17 +94,12 @@ impl<'d> View<'d> {
 
     /// Looks until two looks in a row show the same.
     pub fn picture(&self, size: [usize; 2]) -> Vec<[u8; 3]> {
-        let end = Instant::now() + PATIENCE;
-        let mut before = Vec::new();
-        loop {
-            let now = self.display.look(size);
-            if now == before {
-                return now;
-            }
-            assert!(Instant::now() < end, "the picture does not settle");
-            before = now;
-            std::thread::sleep(Duration::from_millis(400));
-        }
+        let mut now = Vec::new();
+        until("the picture does not settle", 400, || {
+            let before = std::mem::replace(&mut now, self.display.look(size));
+            now == before
+        });
+        now
     }
 
     /// Closes the window by its key: the program ends well, the validation layers are silent. All that was logged.

@@ -50,24 +50,27 @@ impl Job {
         }
     }
 
-    /// Content of the outputs; `None` of one that is not there.
     fn made(&self, folder: &Path) -> Vec<Option<Vec<u8>>> {
         self.outputs.iter().map(|name| std::fs::read(folder.join(name)).ok()).collect()
     }
 
+    /// One run, which neither panics nor hangs and leaves nothing on the device.
+    fn watched(&self, folder: &Path, what: &str, plan: Option<Plan>) -> (Result<()>, Heard) {
+        let run = || catch_unwind(AssertUnwindSafe(|| (self.run)(folder)));
+        let (outcome, heard) = guarded(what, || watch(plan, Claims::default(), run));
+        let outcome = outcome.unwrap_or_else(|_| panic!("{what}: it panicked"));
+        assert_clean(what, &heard);
+        (outcome, heard)
+    }
+
     /// One run without a fault, with all that it made.
     fn good(&self, folder: &Path, what: &str) -> (Vec<Option<Vec<u8>>>, Heard) {
-        let (outcome, heard) =
-            guarded(what, || watch(None, Claims::default(), || catch_unwind(AssertUnwindSafe(|| (self.run)(folder)))));
-        match outcome {
-            Ok(Ok(())) => {}
-            Ok(Err(error)) => panic!("{}: {what}: {error}", self.name),
-            Err(_) => panic!("{}: {what}: it panicked", self.name),
-        }
-        assert_clean(&format!("{}: {what}", self.name), &heard);
+        let what = &format!("{}: {what}", self.name);
+        let (outcome, heard) = self.watched(folder, what, None);
+        outcome.unwrap_or_else(|error| panic!("{what}: {error}"));
         let made = self.made(folder);
         for (name, content) in self.outputs.iter().zip(&made) {
-            assert!(content.is_some(), "{}: {what}: there is no {name}", self.name);
+            assert!(content.is_some(), "{what}: there is no {name}");
         }
         (made, heard)
     }
@@ -120,15 +123,10 @@ impl Job {
         assert!(made == expected, "{}: {what} makes something else", self.name);
     }
 
-    /// One run with a fault.
     fn one(&self, folder: &Path, what: &str, plan: Plan, planned: Call, expected: &[Option<Vec<u8>>]) {
         self.remove(folder, self.outputs);
         self.remove(folder, self.cold);
-        let (outcome, heard) = guarded(what, || {
-            watch(Some(plan), Claims::default(), || catch_unwind(AssertUnwindSafe(|| (self.run)(folder))))
-        });
-        let Ok(outcome) = outcome else { panic!("{what}: it panicked") };
-        assert_clean(what, &heard);
+        let (outcome, heard) = self.watched(folder, what, Some(plan));
         let (call, code) = heard.fired.unwrap_or_else(|| panic!("{what}: only {} calls were made", heard.calls.len()));
         assert_eq!(call, planned, "{what}: the calls before it are others");
         match &outcome {
@@ -160,8 +158,7 @@ fn assert_told(what: &str, call: Call, code: vk::Result, error: &Error) {
     let line = error.to_string();
     assert!(!line.contains('\n') && line == error.line(), "{what}: {line:?} is not one line");
     assert_eq!(error.exit_code(), 5, "{what}: {line}");
-    // Before an object is destroyed the device waits, and passes over the loss of the device; the next call tells of
-    // it.
+    // Before an object is destroyed the device waits, and passes over its loss; the next call tells of it.
     let passes_over = (call.name, code) == ("vkWaitForFences", vk::Result::ERROR_DEVICE_LOST);
     let (_, rest) = line
         .split_once(&format!("{} (", call.name))
@@ -171,7 +168,6 @@ fn assert_told(what: &str, call: Call, code: vk::Result, error: &Error) {
     assert!(!object.is_empty() && rest.starts_with(&format!("{code:?}")), "{what}: {line}");
 }
 
-/// No half-written file in the folder or below.
 fn assert_no_leftovers(what: &str, folder: &Path) {
     for path in paths_below(folder) {
         let name = path.file_name().unwrap_or_default().to_string_lossy();

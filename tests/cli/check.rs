@@ -35,12 +35,7 @@ fn every_pass_is_compared_and_passes() {
 fn a_wrong_shader_is_found() {
     let Some(folder) = Folder::with_device() else { return };
     let wrong = [
-        (
-            "capture.vert",
-            "vec3 q = position.xyz - push.eye.xyz;",
-            "vec3 q = position.xyz - push.eye.xyz + 0.02;",
-            "capture",
-        ),
+        ("capture.vert", "position.xyz - push.eye.xyz", "position.xyz - push.eye.xyz + 0.02", "capture"),
         ("silhouette_field.glsl", "foot + near.depth * along", "foot + 0.9 * near.depth * along", "sharp"),
         ("merge.comp", "float weight = above_horizon", "float weight = 0.999 * above_horizon", "merge"),
         ("draw.frag", "vec4(finish(shown", "vec4(1.01 * finish(shown", "draw"),

@@ -148,10 +148,7 @@ fn what_cannot_be_written_is_found_at_the_start() {
 /// A disk may become full later.
 #[test]
 fn a_late_failure_names_its_file() {
-    if !has_device() {
-        return;
-    }
-    let folder = folder();
+    let Some(folder) = has_device().then(folder) else { return };
     let render =
         folder.command(&format!("render sphere_over_plane -o o.png --vertices v.csv --no-cache --quiet {SMALL}"));
     let ran = finish(&mut limited(&render, "ulimit -f 64"));

@@ -147,13 +147,9 @@ fn shape_survives_rotation_and_refuses_defects() {
     assert!(turned(&cuboid(Vec3::new(1.0, 0.2, 3.0), 9)).is_convex());
     assert!(turned(&sphere(1.0, 5)).is_convex());
     // Rounding of coordinates dents a small ball that stands far from the origin.
-    let bulb = sphere(0.05, 3);
-    let aside = bulb.positions.iter().map(|p| *p + Vec3::new(5.0, 2.4, -3.0)).collect();
-    let aside = Mesh::new("bulb", aside, bulb.normals.clone(), None, bulb.triangles.clone()).unwrap();
+    let aside = joined(&[(&sphere(0.05, 3), Vec3::new(5.0, 2.4, -3.0))]);
     assert!(aside.is_convex() && aside.ball_share().is_some());
-    let ring = torus(0.05, 0.02, 24, 12);
-    let aside = ring.positions.iter().map(|p| *p + Vec3::X * 1000.0).collect();
-    assert!(!Mesh::new("ring", aside, ring.normals, None, ring.triangles).unwrap().is_convex());
+    assert!(!joined(&[(&torus(0.05, 0.02, 24, 12), Vec3::X * 1000.0)]).is_convex());
     assert!(turned(&plane(1.0, 50)).is_flat());
     let rebuild =
         |mesh: &Mesh, triangles| Mesh::new("x", mesh.positions.clone(), mesh.normals.clone(), None, triangles).unwrap();

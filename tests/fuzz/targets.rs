@@ -25,30 +25,19 @@ pub struct Target {
 pub const NAME: &str = "fuzzed";
 
 pub const TARGETS: &[Target] = &[
-    Target {
-        name: "obj",
-        seeds: meshes,
-        tokens: "v |vn |vt |f |//|/|\n|\\\n|g x\n|usemtl m\n|1/1/1",
-        parse: mesh,
-        reads_file: true,
-    },
+    Target { name: "obj", seeds: meshes, tokens: OBJ, parse: mesh, reads_file: true },
     Target { name: "toml", seeds: scenes, tokens: TOML, parse: scene, reads_file: true },
     Target { name: "glb", seeds: models, tokens: GLTF, parse: model, reads_file: true },
     Target { name: "sf", seeds: stored::fields, tokens: HEADER, parse: stored::field, reads_file: true },
     Target { name: "outlines", seeds: stored::outlines, tokens: HEADER, parse: stored::outline, reads_file: true },
-    Target {
-        name: "picture",
-        seeds: pictures,
-        tokens: "\
-            #?RADIANCE\n|FORMAT=32-bit_rle_rgbe\n|-Y 2 +X 4\n|IHDR|IDAT|acTL|channels|chlist|dataWindow|\
-            compression",
-        parse: decode,
-        reads_file: false,
-    },
+    Target { name: "picture", seeds: pictures, tokens: PICTURE, parse: decode, reads_file: false },
     Target { name: "plan", seeds: farm::plans, tokens: farm::TOKENS, parse: farm::plan, reads_file: true },
     Target { name: "slice", seeds: farm::slices, tokens: farm::TOKENS, parse: farm::slice, reads_file: false },
 ];
 
+const OBJ: &str = "v |vn |vt |f |//|/|\n|\\\n|g x\n|usemtl m\n|1/1/1";
+const PICTURE: &str = "\
+    #?RADIANCE\n|FORMAT=32-bit_rle_rgbe\n|-Y 2 +X 4\n|IHDR|IDAT|acTL|channels|chlist|dataWindow|compression";
 const TOML: &str = "\
     [camera]\n|[output]\n|[environment]\n|[[mesh]]\n|[[entity]]\n|eye = |target = |fov_deg = |width = |height = |\
     exposure_ev = |time_s = |strength = |turn_deg = |uniform = |gradient = { radiance = |key = { radiance = |\

@@ -64,16 +64,8 @@ fn other_bands() {
     }
 }
 
-const FLOOR_AND_BALL: &str = r#"
-[[mesh]]
-name = "floor"
-plane = { size_m = 4, cells = 20 }
-[[mesh]]
-name = "ball"
-sphere = { radius_m = 0.5, subdivisions = 2 }
-[[entity]]
-mesh = "floor"
-"#;
+const FLOOR_AND_BALL: &str = "[[mesh]]\nname = \"floor\"\nplane = { size_m = 4, cells = 20 }\n\
+    [[mesh]]\nname = \"ball\"\nsphere = { radius_m = 0.5, subdivisions = 2 }\n[[entity]]\nmesh = \"floor\"\n";
 
 #[test]
 fn emitters_that_occlude_and_receive() {

@@ -41,28 +41,21 @@ fn a_scene_made_in_code_is_that_of_its_file() {
 #[test]
 fn scenes_made_in_code_are_held_to_the_rules_of_scene_files() {
     let ring = || EntityData::of_mesh("ring");
+    let with = |entity| room().entity(entity);
+    let odd = EnvironmentData { uniform: Some(Vec3::NAN), ..Default::default() };
     let cases = [
-        (
-            room().entity(EntityData { albedo: Vec3::splat(1.5).into(), ..ring() }),
-            "entity 3: 1.5 is out of range for an albedo",
-        ),
-        (room().entity(EntityData { position: Vec3::NAN, ..ring() }), "entity 3: NaN is out of range for a position"),
-        (room().entity(EntityData { name: Some("big".into()), scale: 1e9, ..ring() }), "entity \"big\": "),
-        (
-            room().entity(EntityData { emission: Vec3::NEG_ONE, ..ring() }),
-            "entity 3: -1 is out of range for a radiance",
-        ),
-        (room().entity(EntityData::of_mesh("none")), "entity 3: there is no mesh \"none\""),
+        (with(EntityData { albedo: Vec3::splat(1.5).into(), ..ring() }), "entity 3: 1.5 is out of range for an albedo"),
+        (with(EntityData { position: Vec3::NAN, ..ring() }), "entity 3: NaN is out of range for a position"),
+        (with(EntityData { name: Some("big".into()), scale: 1e9, ..ring() }), "entity \"big\": "),
+        (with(EntityData { emission: Vec3::NEG_ONE, ..ring() }), "entity 3: -1 is out of range for a radiance"),
+        (with(EntityData::of_mesh("none")), "entity 3: there is no mesh \"none\""),
         (room().mesh("ring", Generator::Plane { size_m: 1.0, cells: 1 }), "there are two meshes \"ring\""),
         (room().mesh("flat", Generator::Plane { size_m: -1.0, cells: 1 }), "mesh \"flat\": "),
         (room().mesh("none", Generator::Plane { size_m: 1.0, cells: u32::MAX }), "mesh \"none\": "),
         (room().camera(Camera::new([0.0; 3], [0.0; 3])), "camera: the camera's eye and target are the same"),
         (room().camera(Camera { fov_deg: 400.0, ..Camera::new([1.0; 3], [0.0; 3]) }), "camera: fov_deg 400"),
         (room().output(Output { width: 0, ..Default::default() }), "output: a picture of 0 x 640 pixels"),
-        (
-            room().environment(EnvironmentData { uniform: Some(Vec3::NAN), ..Default::default() }),
-            "environment uniform NaN",
-        ),
+        (room().environment(odd), "environment uniform NaN"),
         ((0..5000).fold(Scene::builder(), |all, _| all.entity(ring())), "5000 entities are over the limit of 4096"),
     ];
     for (builder, expected) in cases {
@@ -144,8 +137,7 @@ fn a_renderer_lights_its_scene_at_once_and_refuses_what_is_no_placement() {
     refuse(&mut renderer, &[good[0], good[1], Placement { rotation: Quat::from_rotation_x(0.1), ..good[2] }]);
     assert!(renderer.light().unwrap() == at_once, "what is refused changes nothing");
 
-    // Transfer vectors: baked ones of the ring, lobes of the floor; the first coefficient of an open vertex is sqrt(pi)
-    // / 2.
+    // Transfer vectors: baked of the ring, lobes of the floor; an open vertex begins with sqrt(pi) / 2.
     let [floor, ring] = [0, 1].map(|entity| renderer.transfer(entity).unwrap());
     assert_eq!((floor.bands, floor.coefficients.len()), (3, 9 * at_once[0].len()));
     assert_eq!(ring.coefficients.len(), 9 * at_once[1].len());

@@ -15,20 +15,10 @@ fn scene(rest: &str) -> Scene {
 
 fn text(rest: &str) -> String {
     format!(
-        r#"
-        [camera]
-        eye = [0, 3, 6]
-        target = [0, 0, 0]
-        [[mesh]]
-        name = "floor"
-        plane = {{ size_m = 4, cells = 8 }}
-        [[mesh]]
-        name = "ball"
-        sphere = {{ radius_m = 0.5, subdivisions = 5 }}
-        [[entity]]
-        mesh = "floor"
-        albedo = [0.6, 0.6, 0.6]
-        {rest}"#
+        "[camera]\neye = [0, 3, 6]\ntarget = [0, 0, 0]\n\
+         [[mesh]]\nname = \"floor\"\nplane = {{ size_m = 4, cells = 8 }}\n\
+         [[mesh]]\nname = \"ball\"\nsphere = {{ radius_m = 0.5, subdivisions = 5 }}\n\
+         [[entity]]\nmesh = \"floor\"\nalbedo = [0.6, 0.6, 0.6]\n{rest}"
     )
 }
 

@@ -13,7 +13,6 @@ use shadow_fields::lists::skip::Skip;
 use shadow_fields::scene::Scene;
 use std::path::Path;
 
-/// Edge of the pictures in pixels.
 const SIZE_PX: u32 = 64;
 /// Moments of the scene's period, and states of its entities; each pair is seen again and again.
 const MOMENTS: u64 = 24;

@@ -68,8 +68,7 @@ fn a_scene_of_ones_own() {
     assert_eq!(ways, [&by_vertex[..], &by_pixel].concat());
     assert_eq!(comparisons[0]["rival"], comparisons[1]["rival"]);
     let [sharp, sh] = [0, 1].map(|i| rms(&comparisons[i]["merge_error"]));
-    // At pixels the coarse floor's vertices carry no edge; the same rays stand beside all three, and more of them err
-    // less.
+    // At pixels vertices of the coarse floor carry no edge; all three stand beside the same rays, and more err less.
     let [pixel, vertex, pixel_sh] = [2, 3, 4].map(|i| rms(&comparisons[i]["merge_error"]));
     assert!(pixel < 0.6 * vertex && vertex < pixel_sh, "{pixel}, {vertex}, {pixel_sh}");
     assert_eq!(comparisons[2]["rival"], comparisons[4]["rival"]);

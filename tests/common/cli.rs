@@ -12,10 +12,8 @@ use std::time::SystemTime;
 
 /// Options that make bakes small.
 pub const COARSE: &str = "--lattice cube:4x3 --face-px 16";
-/// Options that make bakes and pictures small.
 pub const SMALL: &str = "--lattice cube:4x3 --face-px 16 --size 96x64";
 
-/// A mesh of one triangle.
 pub const TRIANGLE: &str = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n";
 
 /// What a run left behind.
@@ -62,7 +60,6 @@ pub fn command(folder: &Path, line: &str) -> Command {
     command
 }
 
-/// Runs a command to its end.
 pub fn finish(command: &mut Command) -> Ran {
     let Output { status, stdout, stderr } = command.output().unwrap();
     let text = |bytes| String::from_utf8(bytes).expect("what the program says is UTF-8");
@@ -80,7 +77,6 @@ pub fn has_device() -> bool {
     ran.code == 0
 }
 
-/// A command that finds no driver.
 pub fn without_drivers(command: &mut Command) -> &mut Command {
     for variable in ["VK_DRIVER_FILES", "VK_ICD_FILENAMES"] {
         command.env(variable, "/nowhere/no.json");
@@ -96,7 +92,6 @@ pub fn limited(command: &Command, how: &str) -> Command {
     shell
 }
 
-/// A folder in which the program is run.
 pub struct Folder(tempfile::TempDir);
 
 impl Folder {
@@ -109,12 +104,10 @@ impl Folder {
         Folder(tempfile::Builder::new().prefix(start).tempdir().unwrap())
     }
 
-    /// One within another.
     pub fn inside(outer: &Path) -> Self {
         Folder(tempfile::tempdir_in(outer).unwrap())
     }
 
-    /// One with files.
     pub fn of(files: &[(&str, &str)]) -> Self {
         let folder = Self::new();
         files.iter().for_each(|(name, text)| folder.write(name, text));
@@ -164,7 +157,6 @@ impl Folder {
         self.run(line).ended(0, &[])
     }
 
-    /// What a good run prints as JSON.
     pub fn json(&self, line: &str) -> Value {
         let ran = self.good(&format!("{line} --json"));
         serde_json::from_str(&ran.stdout).unwrap_or_else(|error| panic!("no JSON ({error}): {}", ran.stdout))

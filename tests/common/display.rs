@@ -63,7 +63,6 @@ impl Display {
         (0..width * height).map(pixel).collect()
     }
 
-    /// Ends the server, and waits until it has ended.
     pub fn end(&self) {
         let server = &mut self.server.borrow_mut().0;
         server.kill().unwrap();

@@ -102,7 +102,6 @@ pub fn cache_dir() -> PathBuf {
     Path::new(env!("CARGO_TARGET_TMPDIR")).join("cache")
 }
 
-/// Where tests get their shaders.
 pub fn library() -> Library {
     Library { shader_dir: None, cache_dir: Some(cache_dir()) }
 }
@@ -144,7 +143,6 @@ impl Drop for Gpu {
 }
 
 impl Gpu {
-    /// A baker on the shared device.
     pub fn baker(&self) -> Baker {
         Baker::new(&self.device, &self.library)
     }
@@ -223,7 +221,6 @@ pub fn reshaped(mesh: &Mesh, place: impl Fn(Vec3) -> Vec3) -> Mesh {
     Mesh::new("reshaped", places, Vec::new(), None, mesh.triangles.clone()).unwrap()
 }
 
-/// A mesh that faces the other way.
 pub fn inside_out(mesh: &Mesh) -> Mesh {
     let normals = mesh.normals.iter().map(|normal| -*normal).collect();
     let triangles = mesh.triangles.iter().map(|[a, b, c]| [*a, *c, *b]).collect();
@@ -272,7 +269,6 @@ pub fn of_cells(planes: [&[f32]; 3], holds: impl Fn([usize; 3]) -> bool) -> Mesh
     of_quads("solid", corners)
 }
 
-/// A mesh's places and triangles as OBJ text.
 pub fn obj(mesh: &Mesh) -> String {
     let places = mesh.positions.iter().map(|p| format!("v {} {} {}\n", p.x, p.y, p.z));
     let faces = mesh.triangles.iter().map(|t| t.map(|v| v + 1)).map(|[a, b, c]| format!("f {a} {b} {c}\n"));

@@ -69,7 +69,6 @@ impl Model {
         self.push("accessors", json)
     }
 
-    /// An accessor of f32.
     pub fn floats(&mut self, width: usize, numbers: &[f32]) -> usize {
         let bytes: Vec<u8> = numbers.iter().flat_map(|x| x.to_le_bytes()).collect();
         self.accessor(F32, width, numbers.len() / width, &bytes)
@@ -92,7 +91,6 @@ impl Model {
         self.accessor(U16, 1, indices.len(), &bytes)
     }
 
-    /// A mesh of one primitive with these attributes.
     pub fn mesh(&mut self, attributes: Value, indices: Option<usize>, material: Option<usize>) -> usize {
         let mut primitive = json!({ "attributes": attributes });
         if let Some(indices) = indices {
@@ -104,7 +102,7 @@ impl Model {
         self.push("meshes", json!({ "primitives": [primitive] }))
     }
 
-    /// The same, and a node that has nothing else.
+    /// A mesh of one primitive, and a node that has nothing else.
     pub fn placed(&mut self, attributes: Value, indices: Option<usize>, material: Option<usize>) -> usize {
         let mesh = self.mesh(attributes, indices, material);
         self.node(json!({ "mesh": mesh }));
@@ -193,7 +191,6 @@ impl Model {
         path
     }
 
-    /// The model as GLB.
     pub fn glb(&self) -> Vec<u8> {
         glb(self.whole().to_string().as_bytes(), &self.bytes)
     }

@@ -41,7 +41,6 @@ fn dask_runs_slices_in_two_workers() {
     assert!(farm.collected() == whole().files);
 }
 
-/// A package that is missing ends in one line.
 #[test]
 fn a_dask_that_is_missing_says_so_in_a_line() {
     let Some(farm) = Farm::planned() else { return };
@@ -124,7 +123,6 @@ impl SlurmNode {
         command.stdin(Stdio::null()).stdout(Stdio::null()).status().unwrap().success()
     }
 
-    /// A command that talks to this Slurm.
     fn on<'c>(&self, command: &'c mut Command) -> &'c mut Command {
         command.env("SLURM_CONF", self.0.path().join("slurm.conf")).env("PATH", search_path())
     }

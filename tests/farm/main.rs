@@ -20,7 +20,6 @@ use std::ops::Deref;
 use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 
-/// Options of bakes that make them short.
 const DRAFT: &str = "--quality draft --lattice cube:4x3 --face-px 16";
 const SCENE: &str = r#"
 camera = { eye = [0, 1, 4], target = [0, 0, 0] }
@@ -35,7 +34,6 @@ entity = [
 /// Meshes of a farm: a ring and balls.
 const MESHES: usize = 6;
 
-/// A folder with meshes and a scene.
 struct Farm(Folder);
 
 impl Deref for Farm {
@@ -80,7 +78,6 @@ impl Farm {
         farm
     }
 
-    /// `None` where there is no device.
     fn with_device() -> Option<Self> {
         has_device().then(Self::new)
     }
@@ -147,8 +144,7 @@ fn slices_of_bakes_make_the_bytes_of_a_run_without_a_farm() {
     // The field and outlines of each mesh, and what is baked of the vertices of the one that is not convex.
     assert_eq!(collected.len(), 2 * MESHES + 1);
     assert!(collected == whole().files, "{:?}", collected.keys());
-    // The field of `bake` is the same, and a scene finds the fields that it needs. Its own visibility at rest is past all
-    // else that rests in the scene, which a farm of meshes does not know.
+    // `bake` makes the same field, and a scene finds its fields; at rest it sees past all else, which no farm knows.
     farm.good(&format!("bake meshes/a.obj -o a.sf {DRAFT}"));
     assert!(collected.values().any(|bytes| *bytes == farm.read("a.sf")), "the field of bake");
     let render = format!("render film.toml -o f.png --size 48x32 --json --cache-dir cache {DRAFT}");

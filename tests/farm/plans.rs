@@ -64,7 +64,6 @@ fn works_and_options_that_make_no_plan_are_refused_in_a_line() {
     }
 }
 
-/// Meshes of equal content are baked once.
 #[test]
 fn equal_meshes_are_planned_once() {
     let Some(farm) = Farm::with_device() else { return };
@@ -107,7 +106,6 @@ fn a_plan_replaces_no_other_file() {
     assert!(farm.plan("other.json")["slices"].is_array());
 }
 
-/// Each thing that decides a result is part of its name.
 #[test]
 fn names_of_results_differ_where_anything_differs() {
     let base = common::plan();

@@ -7,7 +7,6 @@ use std::collections::BTreeSet;
 pub struct Census {
     /// Kind and handle of every object that exists.
     live: BTreeSet<(i32, u64)>,
-    /// Memory that the host cannot see.
     unseen: BTreeSet<u64>,
 }
 
@@ -23,7 +22,6 @@ impl Census {
         (!known).then(|| format!("{:?} {:#x} was destroyed, which does not exist", H::TYPE, handle.as_raw()))
     }
 
-    /// Notes that the host cannot see this memory.
     pub fn hide(&mut self, memory: vk::DeviceMemory) {
         self.unseen.insert(memory.as_raw());
     }

@@ -29,7 +29,6 @@ impl Default for Claims {
 }
 
 impl Claims {
-    /// What the driver says.
     pub const NONE: Self = Claims {
         api_version: u32::MAX,
         limits: |_| (),

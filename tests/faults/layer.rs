@@ -29,14 +29,11 @@ pub struct Plan {
     pub error: usize,
 }
 
-/// What was seen during a watch.
 #[derive(Debug, Default)]
 pub struct Heard {
-    /// Calls that could fail, in order.
     pub calls: Vec<Call>,
     /// The call that failed, and its error.
     pub fired: Option<(Call, vk::Result)>,
-    /// Objects that were not destroyed.
     pub left: Vec<String>,
     /// What no valid program does: an object destroyed twice, memory mapped that the host cannot see.
     pub wrong: Vec<String>,
@@ -61,8 +58,7 @@ pub fn state() -> MutexGuard<'static, State> {
 
 /// Runs something and tells what was seen. One watch at a time.
 pub fn watch<R>(plan: Option<Plan>, claims: Claims, run: impl FnOnce() -> R) -> (R, Heard) {
-    // SAFETY: the function answers with the loader's functions or with wrappers of the same kind, all of which are
-    // static.
+    // SAFETY: the function answers with the loader's functions or with wrappers of the same kind, all static.
     unsafe { shadow_fields::gpu::loader::stand_before(instance_address) };
     *state() = State { plan, claims, ..State::default() };
     let outcome = run();
@@ -145,7 +141,6 @@ pub fn dies<H: Handle + Copy>(handle: H) {
 
 pub type Function = unsafe extern "system" fn();
 
-/// The loader itself.
 fn loader() -> vk::PFN_vkGetInstanceProcAddr {
     static ENTRY: OnceLock<ash::Entry> = OnceLock::new();
     // SAFETY: the system's loader is trusted, and is never unloaded.

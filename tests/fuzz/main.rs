@@ -28,7 +28,6 @@ static MEMORY: memory::Counting = memory::Counting;
 const MOST_TIME: Duration = Duration::from_secs(if cfg!(debug_assertions) { 8 } else { 1 });
 /// Bytes that may take as long as a parser: a sphere of 1.3 million triangles takes 0.7 to 1.2 s and as many bytes.
 const TIMED_BYTES: usize = 1 << 28;
-/// Most bytes that an input may take.
 const MOST_BYTES: usize = 1 << 30;
 /// Seconds for all targets where nobody says how many.
 const SECONDS: f64 = 12.0;

@@ -52,7 +52,6 @@ pub fn processor_time() -> std::time::Duration {
     std::time::Duration::new(time.tv_sec as u64, time.tv_nsec as u32)
 }
 
-/// Time of the clock.
 #[cfg(not(unix))]
 pub fn processor_time() -> std::time::Duration {
     static START: std::sync::OnceLock<std::time::Instant> = std::sync::OnceLock::new();

@@ -2,7 +2,6 @@
 
 use fastrand::Rng;
 
-/// Longest input that is made.
 const LONGEST: usize = 1 << 16;
 
 /// Numbers at which parsers go wrong.
@@ -71,7 +70,6 @@ fn word<'t>(random: &mut Rng, words: &'t str, between: char) -> &'t str {
     words[random.usize(..words.len())]
 }
 
-/// Replaces a number in a text.
 fn number(random: &mut Rng, out: &mut Vec<u8>) {
     let is_part = |byte: &u8| byte.is_ascii_digit() || b".-+e".contains(byte);
     let begins: Vec<usize> =

@@ -10,7 +10,6 @@ use shadow_fields::field::{FieldKind, ShadowField, Storage};
 use shadow_fields::{Error, Result, bake};
 use std::path::Path;
 
-/// What `write` writes.
 fn written(write: impl FnOnce(&Path)) -> Vec<u8> {
     with_file(&[], |path| {
         write(path);

@@ -127,8 +127,7 @@ fn a_jpeg_texture_without_coordinates_becomes_its_mean() {
     let [left, right] = halves.map(|half| Vec3::from(half.map(linear)));
     let found = model::scene(&model).0.entities[0].albedo;
     let expected = (left + right) / 2.0;
-    // A step of 8 bits is at most 0.009 in linear light at these colours, and JPEG at this quality is wrong by about
-    // one.
+    // A step of 8 bits is at most 0.009 in linear light here, and JPEG of this quality is off by about one.
     assert!((found - expected).abs().max_element() < 0.01, "{found} for {expected}");
 }
 

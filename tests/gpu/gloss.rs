@@ -72,8 +72,7 @@ fn a_white_metal_vanishes_in_a_furnace() {
         let [a, b] = [0.93, 1.0].map(|z| lobe::energy(roughness, z) as f32);
         assert!(middle > a.min(b) - 0.02 && middle < a.max(b) + 0.02, "{roughness}: {middle}");
     }
-    // A dielectric neither adds nor loses light that can be seen, but at grazing angles, where light that microfacets
-    // pass on to each other is counted a second time by the diffuse part.
+    // A dielectric neither adds nor loses light, but at grazing angles, where the diffuse part counts some twice.
     for roughness in [0.1, 0.5, 1.0] {
         let scene = ball(&format!("roughness = {roughness:.1}"), "environment = { uniform = [1, 1, 1] }");
         let found = gpu.picture(&scene, options(), f32::INFINITY);

@@ -161,7 +161,6 @@ fn what_lies_behind_the_receiver_or_the_light_blocks_nothing() {
     assert_eq!(before, 1.0);
 }
 
-/// What is stored lies as near as a byte can to the number.
 #[test]
 fn bytes_are_rounded_to_nearest() {
     for i in -1000..=1000 {

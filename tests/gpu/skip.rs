@@ -47,8 +47,7 @@ fn what_moves_is_merged_again_to_the_same_bits() {
         let mut rng = fastrand::Rng::with_seed(3);
         let (mut merged, mut all) = (0, 0);
         for round in 0..12 {
-            // Mostly one of 64 moves, a little or across the town; at times it is a light, the floor, three at once, or
-            // none.
+            // Mostly one of 64 moves, a little or across the town; at times a light, the floor, three at once, or none.
             let movers: Vec<usize> = match round {
                 0 | 5 => vec![],
                 3 => vec![4],
@@ -100,7 +99,6 @@ fn exact_skips_change_nothing() {
     }
 }
 
-/// A lamp that is painted black is no light.
 #[test]
 fn a_light_of_zeros_is_left_off() {
     let Some(gpu) = gpu() else { return };
@@ -235,7 +233,6 @@ fn nothing_pops_as_fields_become_caps() {
     }
 }
 
-/// As an occluder passes eps nothing changes by more than it.
 #[test]
 fn nothing_pops_by_more_than_eps() {
     let Some(gpu) = gpu() else { return };

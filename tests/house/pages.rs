@@ -42,8 +42,7 @@ fn subcommands(help: &str) -> BTreeSet<String> {
 /// Keys that a scene file may have where `text` has the unknown key `zzz`: the reader lists them in its complaint.
 fn keys_at(text: &str) -> BTreeSet<String> {
     let error = Data::parse(text, Path::new("keys.toml")).unwrap_err().to_string();
-    // serde writes "unknown field `zzz`, expected one of `a`, `b`", toml "unexpected keys in table: zzz, available
-    // keys: a, b".
+    // serde: "unknown field `zzz`, expected one of `a`, `b`"; toml: "... in table: zzz, available keys: a, b".
     let keys: BTreeSet<String> = match error.split_once("available keys: ") {
         Some((_, listed)) => listed.split(", ").map(|key| key.trim().to_owned()).collect(),
         None => error.split("expected").last().unwrap().split('`').skip(1).step_by(2).map(str::to_owned).collect(),

@@ -17,7 +17,6 @@ struct Crowded {
     receiver: u32,
     /// It, as shaders see it.
     entity: DeviceEntity,
-    /// Bounds of its clusters.
     clusters: Vec<ClusterBounds>,
 }
 

@@ -86,8 +86,7 @@ fn the_pointer_clicks_turns_pans_and_drags() {
         assert_eq!(input.commands(Event::Release(button), &editor), []);
     }
     assert_eq!(input.commands(Event::Wheel(-2.0), &editor), [Command::Zoom(-2.0)]);
-    // In the reference beside the picture, a place stands for the same place of the picture, and so does a drag from
-    // there.
+    // A place in the reference stands for that of the picture beside it, and so does a drag from there.
     let beside = |[x, y]: [f32; 2]| [x + 200.0, y];
     input.commands(Event::Press(Button::Left, beside(ball)), &editor);
     assert_eq!(input.commands(Event::Move(far), &editor).len(), 2);

@@ -15,7 +15,6 @@ use std::time::{Duration, Instant};
 
 pub const SIZE: [u32; 2] = [320, 240];
 pub const FORMAT: ash::vk::Format = ash::vk::Format::R8G8B8A8_SRGB;
-/// A viewer that draws into an image.
 pub struct Stand {
     pub viewer: Viewer,
     image: Image,

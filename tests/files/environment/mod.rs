@@ -15,7 +15,6 @@ fn build(source: &EnvironmentData) -> Environment {
     Environment::new(source, &|path: &Path| Ok(std::fs::read(path).unwrap())).unwrap()
 }
 
-/// The light of a picture.
 fn of_image(file: &Path, scale: f32) -> EnvironmentData {
     EnvironmentData { image: Some(EnvironmentImage { file: file.into(), scale }), ..Default::default() }
 }

@@ -40,14 +40,12 @@ fn a_generated_sky_is_the_papers() {
     assert!((luminance(at(50.0, 0.0)) / y - 4.515_885).abs() < 1e-2, "{}", luminance(at(50.0, 0.0)) / y);
     assert!(b > 1.5 * r, "blue overhead");
     assert_eq!(at(120.0, 10.0), [0.0; 3]);
-    // White level ground shows what was asked for: 1 / pi of the irradiance, which a cosine lobe takes from bands 0, 1,
-    // 2, 4, 6.
+    // White level ground shows what was asked for: 1 / pi of the irradiance, by a cosine lobe of bands 0, 1, 2, 4, 6.
     let cosine = lobe::clamped_cosine(7, DVec3::Y);
     let level =
         |e: &Environment| e.coefficients(7).map(|c| c.iter().zip(&cosine).map(|(c, l)| c * l).sum::<f64>() / PI);
     assert!((luminance(level(&sky)) - 0.5).abs() < 2e-3, "{:?}", level(&sky));
-    // The sun adds its share of that to what faces it, mostly red when it is low; the ground answers with its
-    // reflectance.
+    // The sun adds its share to what faces it, mostly red when it is low; the ground answers with its reflectance.
     let noon = Sky { sun_elevation_deg: 90.0, sun: 2.0, ground: Vec3::new(0.5, 0.25, 0.0), ..clear.clone() };
     let sunny = dome(noon);
     let facing = |e: &Environment| {

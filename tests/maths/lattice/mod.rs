@@ -164,8 +164,7 @@ fn shells_of_a_roomy_object_are_dense_from_the_first_on() {
     let roomy = Lattice { inner: 0.4, ..Lattice::default() };
     let radii: Vec<f64> = (0..roomy.shells).map(|i| roomy.shell(i)).collect();
     assert!((radii[0] - 0.4).abs() < 1e-12 && (radii[radii.len() - 1] - 8.0).abs() < 1e-9, "{radii:?}");
-    // No gap is wider than what is in proportion to the distance, and none collapses where d = 1, where nothing
-    // happens.
+    // No gap is wider than in proportion to the distance, and none collapses at d = 1, where nothing happens.
     for pair in radii.windows(2) {
         assert!(pair[1] > pair[0] && pair[1] - pair[0] < 0.45 * pair[1], "{radii:?}");
     }

@@ -16,7 +16,6 @@ fn multiply(tensor: &Tensor, a: &[f64], b: &[f64]) -> Vec<f64> {
     out
 }
 
-/// The product is the projection of the pointwise product.
 #[test]
 fn product_equals_quadrature_of_the_pointwise_product() {
     let mut rng = Rng::with_seed(4);

@@ -16,7 +16,6 @@ mod plans;
 use cli::{Folder, Ran, finish, has_device};
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
-use std::ops::Deref;
 use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 
@@ -34,15 +33,8 @@ entity = [
 /// Meshes of a farm: a ring and balls.
 const MESHES: usize = 6;
 
-struct Farm(Folder);
-
-impl Deref for Farm {
-    type Target = Folder;
-
-    fn deref(&self) -> &Folder {
-        &self.0
-    }
-}
+/// A folder with meshes and a scene.
+type Farm = Folder;
 
 /// The plan of the meshes, and the cache files that it makes as one slice.
 struct Whole {
@@ -54,7 +46,7 @@ struct Whole {
 fn whole() -> &'static Whole {
     static WHOLE: OnceLock<Whole> = OnceLock::new();
     WHOLE.get_or_init(|| {
-        let farm = Farm::new();
+        let farm = Farm::with_meshes().expect("a device");
         farm.good(&format!("farm plan meshes -o p.json {DRAFT}"));
         farm.good("farm run p.json --slice 0");
         Whole { plan: farm.plan("p.json"), files: farm.collected() }
@@ -62,10 +54,11 @@ fn whole() -> &'static Whole {
 }
 
 impl Farm {
-    fn new() -> Self {
+    /// `None` where there is no device.
+    fn with_meshes() -> Option<Self> {
         // A name that engines have to quote.
         let name = "a farm's \"5%\" $(touch x) `touch x` {command} {slices} {a";
-        let farm = Farm(Folder::named(name));
+        let farm = has_device().then(|| Folder::named(name))?;
         std::fs::create_dir(farm.at("meshes")).unwrap();
         for index in 0..MESHES {
             let mesh = match index {
@@ -75,16 +68,12 @@ impl Farm {
             farm.write(&format!("meshes/{}.obj", ["a", "b", "c", "d", "e", "f"][index]), common::obj(&mesh));
         }
         farm.write("film.toml", SCENE);
-        farm
-    }
-
-    fn with_device() -> Option<Self> {
-        has_device().then(Self::new)
+        Some(farm)
     }
 
     /// One with the plan of its meshes, each a slice of its own.
     fn planned() -> Option<Self> {
-        let farm = Self::with_device()?;
+        let farm = Self::with_meshes()?;
         let mut plan = whole().plan.clone();
         let slice = |index| json!({ "meshes": { "first": index, "count": 1 } });
         plan["slices"] = (0..MESHES).map(slice).collect();
@@ -156,7 +145,7 @@ fn slices_of_bakes_make_the_bytes_of_a_run_without_a_farm() {
 
 #[test]
 fn slices_of_pictures_are_those_of_render() {
-    let Some(farm) = Farm::with_device() else { return };
+    let Some(farm) = Farm::with_meshes() else { return };
     std::fs::copy(farm.at("film.toml"), farm.at("other.toml")).unwrap();
     let options = format!("--size 48x32 --variant storage --time 0.5 {DRAFT}");
     let plan = "farm plan film.toml other.toml --frames 5 --pictures out/$_###.png -o p.json --per-slice 3";

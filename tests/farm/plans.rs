@@ -41,7 +41,7 @@ fn other_programs_devices_and_inputs_are_refused_with_both_names() {
 
 #[test]
 fn works_and_options_that_make_no_plan_are_refused_in_a_line() {
-    let Some(farm) = Farm::with_device() else { return };
+    let Some(farm) = Farm::with_meshes() else { return };
     std::fs::create_dir(farm.at("other")).unwrap();
     std::fs::copy(farm.at("film.toml"), farm.at("other/film.toml")).unwrap();
     farm.write("notes.txt", "");
@@ -66,7 +66,7 @@ fn works_and_options_that_make_no_plan_are_refused_in_a_line() {
 
 #[test]
 fn equal_meshes_are_planned_once() {
-    let Some(farm) = Farm::with_device() else { return };
+    let Some(farm) = Farm::with_meshes() else { return };
     std::fs::copy(farm.at("meshes/b.obj"), farm.at("meshes/c.obj")).unwrap();
     farm.good(&format!("farm plan meshes -o p.json {DRAFT}"));
     let plan = farm.plan("p.json");
@@ -78,7 +78,7 @@ fn equal_meshes_are_planned_once() {
 /// A plan replaces a plan, and nothing else unless it is told to; never an input.
 #[test]
 fn a_plan_replaces_no_other_file() {
-    let Some(farm) = Farm::with_device() else { return };
+    let Some(farm) = Farm::with_meshes() else { return };
     std::fs::create_dir(farm.at("meshes/more")).unwrap();
     for _ in 0..2 {
         let ran = farm.run(&format!("farm plan meshes -o p.json {DRAFT}"));

@@ -14,7 +14,6 @@ mod hidden;
 mod lamps;
 mod light;
 mod merge;
-mod project;
 mod renderer;
 mod self_visibility;
 mod sharp;

@@ -106,12 +106,8 @@ impl Job {
             }
         }
         let seconds = start.elapsed().as_secs_f64();
-        report(&format!(
-            "{}: {} calls can fail, {} faults, {seconds:.1} s",
-            self.name,
-            heard.calls.len(),
-            faults.len()
-        ));
+        let calls = heard.calls.len();
+        report(&format!("{}: {calls} calls can fail, {} faults, {seconds:.1} s", self.name, faults.len()));
         faults.len()
     }
 

@@ -1,10 +1,9 @@
 //! Bad meshes and scenes: each is refused with exit code 4 and one line that names the file and the line to look at.
 
-use std::path::Path;
-
 use shadow_fields::asset::{Mesh, obj};
 use shadow_fields::scene::Scene;
 use shadow_fields::{Error, Result};
+use std::path::Path;
 
 fn refused<T>(result: Result<T>, start: &str, part: &str) {
     let Err(error) = result else { panic!("not refused: {start} {part}") };

@@ -43,15 +43,13 @@ fn refusal(path: &Path) -> String {
 #[test]
 fn round_trip() {
     let folder = tempfile::tempdir().unwrap();
-    for (i, (kind, storage, lattice)) in [
+    let kinds = [
         (FieldKind::Occlusion, Storage::F16, "cube:3x3,inner=1.02"),
         (FieldKind::Occlusion, Storage::F32, "cube:3x3,edges,inner=0.3,outer=5.5"),
         (FieldKind::Radiance, Storage::F16, "cube:3x5"),
         (FieldKind::Radiance, Storage::F32, "cube:1x1"),
-    ]
-    .into_iter()
-    .enumerate()
-    {
+    ];
+    for (i, (kind, storage, lattice)) in kinds.into_iter().enumerate() {
         let path = folder.path().join(format!("below/that/{i}.sf"));
         let mut written = field(kind, storage, lattice, i as u64);
         written.header.radiance_scale = 0.1 + i as f32;

@@ -1,12 +1,11 @@
 //! Meshes: generators against closed forms, derived properties, the enclosing sphere, and OBJ files.
 
 use crate::common::{generate, inside_out, joined, teapot};
-use std::f64::consts::{PI, TAU};
-use std::path::Path;
-
 use generate::{cuboid, plane, sphere, torus, torus_two_colour};
 use glam::{DVec3, Quat, Vec2, Vec3};
 use shadow_fields::asset::{Generator, Mesh, embedded, enclose};
+use std::f64::consts::{PI, TAU};
+use std::path::Path;
 
 /// f32 positions: a few roundings of 6e-8 each, summed over many triangles of either sign.
 const F32: f64 = 1e-6;

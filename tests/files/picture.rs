@@ -1,12 +1,11 @@
 //! Pictures written and read back.
 
 use crate::common::names;
-use std::io::BufReader;
-use std::path::Path;
-
 use shadow_fields::asset::picture::{
     encode_srgb, linear_from_srgb, srgb_from_linear, write_apng, write_png, write_whole,
 };
+use std::io::BufReader;
+use std::path::Path;
 
 #[test]
 fn srgb_curve() {

@@ -1,12 +1,12 @@
 //! Scenes: the embedded ones, defaults, motion in closed form, and TOML there and back.
 
 use crate::common::parse;
-use std::path::Path;
-
 use glam::{Quat, Vec3};
 use shadow_fields::asset::embedded;
+use shadow_fields::asset::environment::EnvironmentData;
 use shadow_fields::field::sub_light::LampFace;
 use shadow_fields::scene::{Data, LightMethod, Lights, Placement, Scene};
+use std::path::Path;
 
 /// A scene of one ball with the given lines in its entity.
 fn ball(lines: &str) -> Scene {
@@ -242,16 +242,9 @@ fn the_scenes_of_the_documentation_load() {
     let reference = file("src/scene/data.rs");
     let scene =
         documented(&lines(reference.split("//! ```toml\n").nth(1).unwrap().split("//! ```\n").next().unwrap(), "//! "));
-    let source = &scene.data.environment;
-    let parts = [
-        source.uniform.is_some(),
-        source.gradient.is_some(),
-        source.key.is_some(),
-        source.sun.is_some(),
-        source.sky.is_some(),
-        source.image.is_some(),
-    ];
-    assert_eq!((parts, scene.data.entities[0].motion.len()), ([true; 6], 5));
+    let EnvironmentData { uniform, gradient, key, sun, sky, image, .. } = &scene.data.environment;
+    assert!(uniform.is_some() && gradient.is_some() && key.is_some() && sun.is_some() && sky.is_some());
+    assert!(image.is_some() && scene.data.entities[0].motion.len() == 5);
 }
 
 #[test]

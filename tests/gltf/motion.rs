@@ -109,13 +109,9 @@ fn nodes_carry_what_stands_in_them() {
     for time_s in [0.0, 0.3, 1.0, 1.7, 3.9, 4.0, 5.3] {
         // A turn in 4 s and one in 2 s; every animation has its own period.
         let angle = |period_s: f64| (time_s / period_s).fract() * std::f64::consts::TAU;
-        let body = DMat4::from_scale_rotation_translation(
-            DVec3::splat(2.0),
-            DQuat::from_rotation_y(angle(4.0)),
-            DVec3::new(1.0, 0.0, 0.0),
-        );
-        let arm =
-            DMat4::from_rotation_translation(DQuat::from_rotation_z(90_f64.to_radians()), DVec3::new(3.0, 0.0, 0.0));
+        let turn = DQuat::from_rotation_y(angle(4.0));
+        let body = DMat4::from_scale_rotation_translation(DVec3::splat(2.0), turn, DVec3::X);
+        let arm = DMat4::from_rotation_translation(DQuat::from_rotation_z(90_f64.to_radians()), 3.0 * DVec3::X);
         let moon = DMat4::from_rotation_translation(DQuat::from_rotation_x(angle(2.0)), DVec3::new(0.0, 0.5, 0.0));
         for point in [DVec3::ZERO, DVec3::new(0.2, -0.1, 0.3)] {
             for (entity, matrix) in [(0, body), (1, body * arm * moon)] {

@@ -169,11 +169,8 @@ fn a_quad_that_glows_is_a_rectangle_that_shines_from_both_sides() {
     let corners = [place(-1.0, -0.25), place(1.0, -0.25), place(1.0, 0.25), place(-1.0, 0.25)];
     for scale in [[2.0, 2.0, 2.0], [3.0, 3.0, 3.0]] {
         let mut model = Model::default();
-        let glow = model.push(
-            "materials",
-            json!({ "emissiveFactor": [1, 1, 1],
-            "extensions": { "KHR_materials_emissive_strength": { "emissiveStrength": 9 } } }),
-        );
+        let strength = json!({ "KHR_materials_emissive_strength": { "emissiveStrength": 9 } });
+        let glow = model.push("materials", json!({ "emissiveFactor": [1, 1, 1], "extensions": strength }));
         let positions = model.positions(&corners.map(|corner| corner.to_array()).concat());
         let indices = model.indices(&[0, 2, 1, 0, 3, 2]);
         let mesh = model.mesh(json!({ "POSITION": positions }), Some(indices), Some(glow));
@@ -204,13 +201,11 @@ fn many_nodes_are_joined() {
     let corners: [[f32; 3]; 4] = [[0.0, 0.0, 0.0], [0.2, 0.0, 0.0], [0.0, 0.3, 0.0], [0.0, 0.0, 0.4]];
     let positions = model.positions(corners.as_flattened());
     let indices = model.indices(&[0, 2, 1, 0, 1, 3, 0, 3, 2, 1, 2, 3]);
-    let kinds: Vec<_> = [json!({}), json!({ "doubleSided": true }), json!({ "emissiveFactor": [1, 1, 1] })]
-        .into_iter()
-        .map(|material| {
-            let material = model.push("materials", material);
-            model.mesh(json!({ "POSITION": positions }), Some(indices), Some(material))
-        })
-        .collect();
+    let materials = [json!({}), json!({ "doubleSided": true }), json!({ "emissiveFactor": [1, 1, 1] })];
+    let kinds = materials.map(|material| {
+        let material = model.push("materials", material);
+        model.mesh(json!({ "POSITION": positions }), Some(indices), Some(material))
+    });
     let place = |i: usize| Vec3::new((i % 80) as f32, 0.0, (i / 80) as f32);
     for i in 0..4400 {
         let turn = Quat::from_rotation_y(i as f32);

@@ -67,15 +67,13 @@ fn uniform_scales_are_placements_and_others_are_baked() {
     let import = load(&model);
     let unit: Vec<DVec3> = (0..8).map(|i| DVec3::new((i & 1).into(), (i >> 1 & 1).into(), (i >> 2).into())).collect();
     let outer = DMat4::from_scale_rotation_translation(DVec3::splat(2.0), DQuat::IDENTITY, DVec3::X);
-    for (entity, own) in [
+    let bends = [
         DMat4::from_scale_rotation_translation(DVec3::ONE, turn, DVec3::new(0.0, 3.0, 0.0)),
         DMat4::from_scale_rotation_translation(DVec3::new(1.0, 2.0, 3.0), turn, DVec3::ZERO),
         DMat4::from_scale(DVec3::new(1.0, 2.0, 3.0)),
         DMat4::from_scale_rotation_translation(DVec3::new(-1.0, 1.0, 1.0), turn, DVec3::ZERO),
-    ]
-    .into_iter()
-    .enumerate()
-    {
+    ];
+    for (entity, own) in bends.into_iter().enumerate() {
         let found = world(&import, entity, 0.0);
         let expected: Vec<DVec3> = unit.iter().map(|p| (outer * own).transform_point3(*p)).collect();
         for point in &expected {

@@ -165,11 +165,8 @@ fn textures_become_maps() {
     moved["normalTexture"] = json!({ "index": texture, "texCoord": 1 });
     square(&mut model, moved, true);
     // Without coordinates the mean counts.
-    square(
-        &mut model,
-        json!({ "pbrMetallicRoughness": { "metallicRoughnessTexture": info, "metallicFactor": 1 } }),
-        false,
-    );
+    let rough = json!({ "metallicRoughnessTexture": info, "metallicFactor": 1 });
+    square(&mut model, json!({ "pbrMetallicRoughness": rough }), false);
     let shift = json!({ "KHR_texture_transform": { "offset": [0, -0.5] } });
     let shifted = json!({ "index": texture, "extensions": shift });
     let material = json!({ "pbrMetallicRoughness": { "metallicRoughnessTexture": shifted }, "normalTexture": shifted });

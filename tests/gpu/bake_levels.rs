@@ -16,11 +16,9 @@ const OFF: f64 = 0.003;
 fn scanned(subdivisions: u32) -> Mesh {
     let ball = generate::sphere(1.0, subdivisions);
     let bump = |p: &Vec3| {
-        let waves = |f: f32| (f * p.x + f).sin() * (f * p.y + 0.7 * f).sin() * (f * p.z + 2.1 * f).sin();
-        let sum: f32 = [(3.0, 0.25), (7.0, 0.08), (17.0, 0.02), (41.0, 0.004), (97.0, 0.0008)]
-            .map(|(f, a)| a * waves(f))
-            .iter()
-            .sum();
+        let wave = |f: f32| (f * p.x + f).sin() * (f * p.y + 0.7 * f).sin() * (f * p.z + 2.1 * f).sin();
+        let waves = [(3.0, 0.25), (7.0, 0.08), (17.0, 0.02), (41.0, 0.004), (97.0, 0.0008)];
+        let sum: f32 = waves.map(|(f, a)| a * wave(f)).iter().sum();
         *p * Vec3::new(1.0, 1.4, 0.8) * (1.0 + sum)
     };
     let positions = ball.positions.iter().map(bump).collect();

@@ -93,21 +93,15 @@ fn highlights_and_reflections_are_those_of_rays() {
         )
     };
     let down = "rotation = { axis = [0, 0, 1], angle_deg = 160 }";
+    let sun = "environment = { sun = { radiance = [900, 900, 900], toward = [1, 2, 1.5], angle_deg = 2 } }";
+    let floor = "environment = { gradient = { radiance = [1, 1.1, 1.3] } }\n\
+        [[mesh]]\nname = \"floor\"\nplane = { size_m = 6, cells = 12 }\n[[entity]]\nmesh = \"floor\"\nposition = [0, -1, 0]\n";
     let around = [
-        (
-            "sun",
-            "environment = { sun = { radiance = [900, 900, 900], toward = [1, 2, 1.5], angle_deg = 2 } }".to_owned(),
-        ),
+        ("sun", sun.to_owned()),
         ("ball", lamp("sphere = { radius_m = 0.25, subdivisions = 3 }", "")),
         ("disc", lamp("disc = { radius_m = 0.3 }", down)),
         ("rectangle", lamp("rectangle = { size_m = [0.9, 0.4] }", down)),
-        (
-            "floor",
-            "environment = { gradient = { radiance = [1, 1.1, 1.3] } }\n\
-             [[mesh]]\nname = \"floor\"\nplane = { size_m = 6, cells = 12 }\n\
-             [[entity]]\nmesh = \"floor\"\nposition = [0, -1, 0]\n"
-                .to_owned(),
-        ),
+        ("floor", floor.to_owned()),
     ];
     let mut lines = Vec::new();
     for (name, around) in &around {

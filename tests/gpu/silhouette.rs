@@ -56,13 +56,10 @@ fn shadows_on_a_floor_are_those_of_rays() {
             let errors = (0..ACROSS * ACROSS).map(|i| {
                 let at = |i: usize| 4.4 * (i as f64 + 0.5) / ACROSS as f64 - 2.2;
                 let point = DVec3::new(at(i % ACROSS), floor, at(i / ACROSS));
-                let [blocked, whole] = blocked_light(
-                    &field,
-                    point,
-                    DVec3::Y,
-                    &SeenLight::new(light - point, (light - point).length() * angle.sin()),
-                );
-                blocked / whole - blocked_by_rays(&shape, point, (light - point).normalize(), angle)
+                let to = light - point;
+                let seen = SeenLight::new(to, to.length() * angle.sin());
+                let [blocked, whole] = blocked_light(&field, point, DVec3::Y, &seen);
+                blocked / whole - blocked_by_rays(&shape, point, to.normalize(), angle)
             });
             let rms = (errors.map(|e| e * e).sum::<f64>() / (ACROSS * ACROSS) as f64).sqrt();
             assert!(rms < limit, "{} under {angle_deg} deg: {rms}", mesh.name);

@@ -1,11 +1,10 @@
 //! The pages name keys of scene files, commands and paths that exist.
 
 use crate::root;
+use shadow_fields::scene::Data;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 use std::process::Command;
-
-use shadow_fields::scene::Data;
 
 /// The pages that a reader meets first.
 const PAGES: [&str; 5] = ["README.md", "docs/scene.md", "docs/measured.md", "docs/ci.md", "docs/farm.md"];
@@ -82,10 +81,8 @@ fn keys_that_are_read() -> BTreeMap<String, BTreeSet<String>> {
         add("[[entity]]", &format!("[[entity]]\nmotion = [{{ node = {{ {part}_keys = {{ zzz = 1 }} }} }}]"));
     }
     // These are read by hand; the complaint lists only generators.
-    tables
-        .get_mut("[[mesh]]")
-        .unwrap()
-        .extend(["name", "file", "part", "piece", "bend", "pose", "joined"].map(str::to_owned));
+    let of_meshes = ["name", "file", "part", "piece", "bend", "pose", "joined"].map(str::to_owned);
+    tables.get_mut("[[mesh]]").unwrap().extend(of_meshes);
     tables
 }
 

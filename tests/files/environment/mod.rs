@@ -2,14 +2,13 @@
 
 mod sun;
 
-use std::f64::consts::PI;
-use std::path::Path;
-
 use crate::common::cap;
 use glam::{DVec3, Vec3};
 use shadow_fields::asset::environment::{Environment, EnvironmentData, EnvironmentImage, Gradient, KeyLight};
 use shadow_fields::asset::picture::{write_exr, write_png};
 use shadow_fields::sh::{basis, quadrature};
+use std::f64::consts::PI;
+use std::path::Path;
 
 fn build(source: &EnvironmentData) -> Environment {
     Environment::new(source, &|path: &Path| Ok(std::fs::read(path).unwrap())).unwrap()

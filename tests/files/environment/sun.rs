@@ -118,10 +118,8 @@ fn the_lights_of_a_picture_are_taken_out_whole() {
         let sum =
             |c: usize| (0..SIZE[0] * SIZE[1]).map(|i| f64::from(texels[3 * i as usize + c]) * solid(i / SIZE[0])).sum();
         let image = Some(EnvironmentImage { file, scale: 3.0 });
-        (
-            build(&EnvironmentData { image, strength: 0.5, ..Default::default() }),
-            [0, 1, 2].map(sum).map(|s: f64| 1.5 * s),
-        )
+        let environment = build(&EnvironmentData { image, strength: 0.5, ..Default::default() });
+        (environment, [0, 1, 2].map(sum).map(|s: f64| 1.5 * s))
     };
     let sun = DVec3::new(0.3, 0.6, -0.7).normalize();
     let sky = |d: DVec3| 0.2 + 0.3 * d.y.max(0.0) as f32;

@@ -5,6 +5,7 @@ mod interpolation;
 use crate::common::generate;
 use fastrand::Rng;
 use glam::DVec3;
+use shadow_fields::asset::Mesh;
 use shadow_fields::bake;
 use shadow_fields::field::lattice::{CELL_WARP, OUTSIDE_INNER, cap_cosine, cap_height, unwarp, warp};
 use shadow_fields::field::{FieldKind, Fit, Lattice};
@@ -229,22 +230,16 @@ fn bad_lattices_are_refused() {
 
 #[test]
 fn first_shell_follows_the_shape() {
-    let first = |mesh: &shadow_fields::asset::Mesh| {
-        bake::header(mesh, FieldKind::Occlusion, &bake::Options::default()).lattice.inner
-    };
-    assert_eq!(first(&generate::sphere(3.0, 3)), OUTSIDE_INNER);
-    assert_eq!(first(&generate::torus(1.0, 0.3, 24, 12)), 0.25, "room up to the centre");
+    let lattice = |mesh: Mesh| bake::header(&mesh, FieldKind::Occlusion, &bake::Options::default()).lattice;
+    let first = |mesh| lattice(mesh).inner;
+    assert_eq!(first(generate::sphere(3.0, 3)), OUTSIDE_INNER);
+    assert_eq!(first(generate::torus(1.0, 0.3, 24, 12)), 0.25, "room up to the centre");
     // A box of 4 x 1 x 2: its middle is the shells', its short edges are stretched by half their proportions.
-    let slab = bake::header(
-        &generate::cuboid(glam::Vec3::new(4.0, 1.0, 2.0), 2),
-        FieldKind::Occlusion,
-        &bake::Options::default(),
-    );
-    let lattice = slab.lattice;
-    assert_eq!((lattice.fit().stretch, lattice.outer), ([1.0, 2.0, 1.421875], 8.0));
+    let slab = lattice(generate::cuboid(glam::Vec3::new(4.0, 1.0, 2.0), 2));
+    assert_eq!((slab.fit().stretch, slab.outer), ([1.0, 2.0, 1.421875], 8.0));
     // Half an edge of 1 in bounding radii of sqrt 21 / 2, stretched by 2.
-    assert!((lattice.inner - 2.0 / 21.0_f64.sqrt()).abs() < 1e-6, "{}", lattice.inner);
+    assert!((slab.inner - 2.0 / 21.0_f64.sqrt()).abs() < 1e-6, "{}", slab.inner);
     // A cube's faces stand 1 / sqrt 3 of the bounding radius from the centre.
-    let cube = first(&generate::cuboid(glam::Vec3::ONE, 2));
+    let cube = first(generate::cuboid(glam::Vec3::ONE, 2));
     assert!((cube - 3.0_f64.sqrt().recip()).abs() < 1e-6, "{cube}");
 }

@@ -1,11 +1,10 @@
 //! The basis: constants of the convention, orthonormality, a slow twin in angles, the program that is printed as GLSL.
 
-use std::f64::consts::PI;
-
 use fastrand::Rng;
 use glam::DVec3;
 use shadow_fields::sh::basis::{MAX_BANDS, basis_program, coefficient_count, evaluate, values};
 use shadow_fields::sh::quadrature::{icosahedral_rule, random_direction, sphere_rule};
+use std::f64::consts::PI;
 
 /// The associated Legendre function P_l^m(cos theta) with Condon-Shortley phase from its explicit sum over powers:
 /// (-1)^m 2^l sin^m sum_k k! / (k - m)! cos^(k-m) binomial(l, k) binomial((l + k - 1) / 2, l).

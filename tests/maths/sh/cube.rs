@@ -1,7 +1,5 @@
 //! Cube geometry against Vulkan's table, solid angles, projection.
 
-use std::f64::consts::PI;
-
 use super::random;
 use fastrand::Rng;
 use glam::DVec3;
@@ -9,6 +7,7 @@ use shadow_fields::sh::basis::values;
 use shadow_fields::sh::cube::{FACE_COUNT, direction, face_st, solid_angle, texel_st};
 use shadow_fields::sh::project::project;
 use shadow_fields::sh::quadrature::random_direction;
+use std::f64::consts::PI;
 
 /// The table of the Vulkan specification as it is printed there: (sc, tc, rc) of a direction on each face.
 fn vulkan_table(face: usize, r: DVec3) -> [f64; 3] {

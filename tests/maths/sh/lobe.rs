@@ -1,13 +1,12 @@
 //! Closed forms against quadrature and against figures of the literature.
 
-use std::f64::consts::PI;
-
 use super::assert_close;
 use crate::common::cap;
 use glam::DVec3;
 use shadow_fields::sh::basis::{MAX_BANDS, coefficient_count, values};
 use shadow_fields::sh::lobe::{clamped_cosine, zonal};
 use shadow_fields::sh::quadrature::sphere_rule;
+use std::f64::consts::PI;
 
 const AXES: [DVec3; 4] = [
     DVec3::new(0.36, -0.48, 0.8),

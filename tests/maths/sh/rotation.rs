@@ -1,13 +1,12 @@
 //! Rotation of coefficients is rotation of the function.
 
-use std::f64::consts::PI;
-
 use super::{assert_close, random};
 use fastrand::Rng;
 use glam::{DQuat, DVec3};
 use shadow_fields::sh::basis::{MAX_BANDS, values};
 use shadow_fields::sh::quadrature::random_direction;
 use shadow_fields::sh::rotation::{Rotation, rotate_program, turns};
+use std::f64::consts::PI;
 
 fn random_rotation(rng: &mut Rng) -> DQuat {
     DQuat::from_axis_angle(random_direction(rng), 2.0 * PI * rng.f64())

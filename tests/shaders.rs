@@ -133,10 +133,9 @@ fn drawing() -> Vec<ShaderPermutation> {
     rows.extend([Step::Coarse, Step::Fine].map(LightImages::select_row));
     rows.extend(sharp.iter().map(LightImages::evaluate_row));
     rows.push(Smooth::fragment());
-    rows.extend(
-        ["overlay.vert", "overlay.frag", "show.vert", "show.frag", "sky.frag", "smooth.vert", "mirror_far.frag"]
-            .map(|file| ShaderPermutation::new(file, 4)),
-    );
+    let plain =
+        ["overlay.vert", "overlay.frag", "show.vert", "show.frag", "sky.frag", "smooth.vert", "mirror_far.frag"];
+    rows.extend(plain.map(|file| ShaderPermutation::new(file, 4)));
     rows
 }
 
@@ -168,9 +167,8 @@ fn usual_permutation() -> MergePermutation {
 fn merging() -> Vec<ShaderPermutation> {
     let usual = usual_permutation();
     let mut permutations = vec![usual];
-    permutations.extend(
-        ["none", "horizon", "cones", "caps"].map(|skip| MergePermutation { skip: skip.parse().unwrap(), ..usual }),
-    );
+    let skips = ["none", "horizon", "cones", "caps"].map(|skip| skip.parse().unwrap());
+    permutations.extend(skips.map(|skip| MergePermutation { skip, ..usual }));
     // Seven bands take 33 s to optimise, six 5 s, four 0.6 s: seven are left out.
     permutations.extend((2..=6).map(|bands| MergePermutation { bands, ..usual }));
     for &variant in VARIANTS {

@@ -83,11 +83,8 @@ fn rotations() {
     let angle = 0.5f64.to_degrees();
     near(ball(&format!("rotation = {{ axis = [0, 0, 7], angle_deg = {angle} }}")).at(0.0)[0], Vec3::ZERO, turned);
     let (s, c) = 0.25f64.sin_cos();
-    near(
-        ball(&format!("rotation = {{ quaternion = [0, 0, {}, {}] }}", 3.0 * s, 3.0 * c)).at(9.0)[0],
-        Vec3::ZERO,
-        turned,
-    );
+    let quaternion = format!("rotation = {{ quaternion = [0, 0, {}, {}] }}", 3.0 * s, 3.0 * c);
+    near(ball(&quaternion).at(9.0)[0], Vec3::ZERO, turned);
     // Between keys of any length the turn has a constant rate.
     let (s, c) = 1.0_f64.sin_cos();
     let turning = format!(

@@ -300,10 +300,8 @@ fn spots_shine_within_their_cone() {
     let spot = json!({ "innerConeAngle": 0.3, "outerConeAngle": 0.6 });
     let light = model.light(json!({ "type": "spot", "intensity": 10, "color": [1, 0.5, 0.25], "spot": spot }));
     let outer = model.node(json!({ "scale": [2, 2, 2], "translation": [0, 1, 0] }));
-    model.child(
-        outer,
-        json!({ "translation": [0, 0.5, 0], "rotation": [-QUARTER, 0, 0, QUARTER], "extensions": light }),
-    );
+    let down = json!([-QUARTER, 0, 0, QUARTER]);
+    model.child(outer, json!({ "translation": [0, 0.5, 0], "rotation": down, "extensions": light }));
     let (mut scene, notes) = model::scene(&model);
     scene.surround(&Surroundings::None).unwrap();
     assert_eq!(notes.left_out(), [""; 0]);

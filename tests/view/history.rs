@@ -20,6 +20,7 @@ fn history_is_bounded() {
 fn any_command() -> impl Strategy<Value = Command> {
     let number = || prop_oneof![-300.0_f32..300.0, Just(f32::NAN), Just(f32::INFINITY), Just(-1e30), Just(0.0)];
     let place = move || [number(), number()];
+    let bound = CONTROLS.iter().flat_map(|row| row.bindings).map(|(.., command)| *command);
     prop_oneof![
         place().prop_map(Command::Orbit),
         place().prop_map(Command::Pan),
@@ -32,9 +33,7 @@ fn any_command() -> impl Strategy<Value = Command> {
         number().prop_map(Command::SetLight),
         number().prop_map(Command::SetExposure),
         [0_u32..2000, 0_u32..2000].prop_map(Command::Resize),
-        proptest::sample::select(
-            CONTROLS.iter().flat_map(|row| row.bindings).map(|(.., command)| *command).collect::<Vec<_>>(),
-        ),
+        proptest::sample::select(bound.collect::<Vec<_>>()),
         proptest::sample::select(vec![Command::DragEnd, Command::EndSlide]),
     ]
 }

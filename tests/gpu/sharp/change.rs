@@ -72,10 +72,7 @@ fn a_light_that_is_switched_on_meets_the_chains() {
     dark.entities[2].emits = false;
     let options = frame::Options { lights: Lights::Sh, ..check::sharp_options() };
     let new = |scene: &Scene| gpu.frame(scene, options);
-    let light = |frame: &mut Frame| {
-        frame.render(&scene.at(0.0), None).unwrap();
-        frame.radiosity(0).unwrap()
-    };
+    let light = |frame: &mut Frame| gpu.light(frame, &scene.at(0.0)).swap_remove(0);
     let mut frame = new(&dark);
     let without = light(&mut frame);
     assert!(!frame.permutation().lights && frame.covers(&scene));

@@ -260,13 +260,10 @@ fn lights_add_up_where_points_leave_out_what_stands_beside() {
     };
     let scene = at(3.0);
     let lights: Vec<usize> = (0..scene.entities.len()).filter(|&j| scene.entities[j].emits).collect();
-    let new = |scene: &Scene, options| gpu.frame(scene, options);
     let under = |shining: &[usize]| {
         let mut lit = scene.clone();
         lights.iter().for_each(|&j| lit.entities[j].emits = shining.contains(&j));
-        let mut frame = new(&lit, check::sharp_options());
-        frame.render(&lit.at(0.0), None).unwrap();
-        (0..3).flat_map(|entity| frame.radiosity(entity).unwrap()).flatten().collect::<Vec<f32>>()
+        gpu.lit(&lit, check::sharp_options())[..3].concat().concat()
     };
     let all = under(&lights);
     let mut sum = vec![0.0; all.len()];
@@ -301,12 +298,11 @@ fn a_sun_lights_as_its_closed_form() {
         let scene = parse(&format!(
             "{HEAD}albedo = [1, 1, 1]\n[environment]\nsun = {{ toward = {toward:?}, angle_deg = {angle_deg:?}, radiance = [4, 2, 1] }}\n"
         ));
-        let mut frame = gpu.frame(&scene, check::sharp_options());
-        frame.render(&scene.at(0.0), None).unwrap();
+        let light = gpu.lit(&scene, check::sharp_options()).swap_remove(0);
         let [x, y, z] = toward;
         let cosine = y / f64::sqrt(x * x + y * y + z * z);
         let wanted = 4.0 * (f64::to_radians(angle_deg) / 2.0).sin().powi(2) * cosine;
-        for [red, green, blue] in frame.radiosity(0).unwrap().into_iter().map(|rgb| rgb.map(f64::from)) {
+        for [red, green, blue] in light.into_iter().map(|rgb| rgb.map(f64::from)) {
             assert!((red / wanted - 1.0).abs() < 2e-3, "{angle_deg} degrees: {red} for {wanted}");
             assert!((red - 2.0 * green).abs() < 1e-5 * red && (red - 4.0 * blue).abs() < 1e-5 * red);
         }

@@ -164,16 +164,13 @@ fn parsers_survive_mutated_inputs() {
     let wanted = std::env::var("FUZZ_TARGET").ok();
     let chosen: Vec<&Target> = TARGETS.iter().filter(|t| wanted.as_ref().is_none_or(|name| name == t.name)).collect();
     assert!(!chosen.is_empty(), "no target has that name");
-    let seconds = number("FUZZ_SECONDS").unwrap_or(SECONDS) / chosen.len() as f64;
+    let time = Duration::from_secs_f64(number("FUZZ_SECONDS").unwrap_or(SECONDS) / chosen.len() as f64);
     let seed = number("FUZZ_SEED").unwrap_or(1.0) as u64;
     let most = number("FUZZ_EXECUTIONS").map_or(u64::MAX, |most| most as u64);
     // What panics is told once, by this test.
     let hook = std::panic::take_hook();
     std::panic::set_hook(Box::new(|_| ()));
-    let outcomes: Vec<_> = chosen
-        .iter()
-        .map(|target| catch_unwind(|| target.fuzz(Duration::from_secs_f64(seconds), most, seed)))
-        .collect();
+    let outcomes: Vec<_> = chosen.iter().map(|target| catch_unwind(|| target.fuzz(time, most, seed))).collect();
     std::panic::set_hook(hook);
     let mut broken = Vec::new();
     for (target, outcome) in chosen.iter().zip(outcomes) {

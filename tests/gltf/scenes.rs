@@ -20,13 +20,12 @@ fn arrows() -> Model {
     let grey = model.paint([0.5; 3]);
     let body = model.cuboid([-0.5; 3], [0.5; 3], Some(grey));
     let body = model.node(json!({ "name": "body", "mesh": body }));
-    for axis in 0..3 {
+    for (axis, name) in ["x", "y", "z"].into_iter().enumerate() {
         let mut color = [0.1; 3];
         color[axis] = 0.8;
         let mut low = [-0.1; 3];
         let mut high = [0.1; 3];
         (low[axis], high[axis]) = (0.5, 2.0);
-        let name = ["x", "y", "z"][axis];
         let paint = model.paint(color);
         let mesh = model.cuboid(low, high, Some(paint));
         model.child(body, json!({ "name": name, "mesh": mesh }));

@@ -1,24 +1,24 @@
 //! What a bake leaves out: samples that faces of the lattice share, and equal meshes.
 
-use crate::common::{generate, gpu, parse};
+use crate::common::{generate, gpu};
+use crate::stage::scene;
 use shadow_fields::bake::cache::Cache;
 use shadow_fields::bake::{self, SceneNeeds};
 use shadow_fields::field::FieldKind;
 use shadow_fields::scene::Scene;
 use shadow_fields::scene_buffers::SceneBuffers;
 
+/// A mesh and an entity of it.
+fn ring(name: &str, size: &str) -> String {
+    format!("[[mesh]]\nname = \"{name}\"\ntorus = {{ {size}, segments = 12 }}\n[[entity]]\nmesh = \"{name}\"\n")
+}
+
 #[test]
 fn the_same_mesh_under_two_names_is_baked_once() {
     let Some(gpu) = gpu() else { return };
-    let meshes = |names: [&str; 2], sides: [u32; 2]| {
-        let mesh = |(name, sides): (&str, u32)| {
-            let size = format!("major_m = 1.0, minor_m = 0.3, segments = 12, sides = {sides}");
-            let entity = format!("[[entity]]\nmesh = \"{name}\"\n");
-            format!("[[mesh]]\nname = \"{name}\"\ntorus = {{ {size} }}\n{entity}")
-        };
-        let text: String = names.into_iter().zip(sides).map(mesh).collect();
-        let rest = "[environment]\nuniform = [1, 1, 1]\n[camera]\neye = [0, 0, 5]\ntarget = [0, 0, 0]\n";
-        parse(&format!("{text}{rest}"))
+    let rings = |sides: [u32; 2]| {
+        let [a, b] = sides.map(|sides| format!("major_m = 1, minor_m = 0.3, sides = {sides}"));
+        scene(&format!("environment = {{ uniform = [1, 1, 1] }}\n{}{}", ring("a", &a), ring("b", &b)))
     };
     let options = bake::Options { lattice: "cube:3x3".parse().unwrap(), face_px: 16, ..Default::default() };
     let buffers = |scene: &Scene| {
@@ -27,8 +27,8 @@ fn the_same_mesh_under_two_names_is_baked_once() {
         assert_eq!(baked.meshes.len(), 2);
         SceneBuffers::new(&gpu.device, scene, &options, baked).unwrap()
     };
-    let same = buffers(&meshes(["a", "b"], [8, 8]));
-    let other = buffers(&meshes(["a", "b"], [8, 10]));
+    let same = buffers(&rings([8, 8]));
+    let other = buffers(&rings([8, 10]));
     let names = |buffers: &SceneBuffers| buffers.baked.iter().map(|b| b.what.clone()).collect::<Vec<_>>();
     assert_eq!(names(&same), ["a shadow", "a view"]);
     assert_eq!(names(&other), ["a shadow", "b shadow", "a view", "b view"]);
@@ -42,13 +42,10 @@ fn the_same_mesh_under_two_names_is_baked_once() {
 #[test]
 fn meshes_of_one_shape_share_outlines() {
     let Some(gpu) = gpu() else { return };
-    let ring = |name: &str, size: f32| {
-        let size = format!("major_m = {size}, minor_m = {}, segments = 12, sides = 8", 0.25 * size);
-        format!("[[mesh]]\nname = \"{name}\"\ntorus = {{ {size} }}\n[[entity]]\nmesh = \"{name}\"\n")
-    };
-    let light = "[environment]\nsun = { toward = [0, 1, 0], radiance = [9, 9, 9] }\n";
-    let rest = format!("{light}[camera]\neye = [0, 0, 5]\ntarget = [0, 0, 0]\n");
-    let scene = parse(&format!("{}{}{rest}", ring("a", 1.0), ring("b", 2.0)));
+    let light = "environment = { sun = { toward = [0, 1, 0], radiance = [9, 9, 9] } }\n";
+    let small = ring("a", "major_m = 1, minor_m = 0.25, sides = 8");
+    let large = ring("b", "major_m = 2, minor_m = 0.5, sides = 8");
+    let scene = scene(&format!("{light}{small}{large}"));
     let options = bake::Options::default();
     let needs = SceneNeeds::of(&scene, &options, shadow_fields::scene::Lights::default());
     let folder = tempfile::tempdir().unwrap();

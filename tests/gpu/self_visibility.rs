@@ -1,6 +1,7 @@
 //! Self-visibility: closed forms, the shader's lookup against Rust's, direct light against rays.
 
-use crate::common::{cap, generate, gpu, inside_out, parse};
+use crate::common::{cap, generate, gpu, inside_out};
+use crate::stage::scene;
 use glam::{DVec3, Vec3, Vec4};
 use shadow_fields::asset::Mesh;
 use shadow_fields::bake::surfaces::{BakedSurface, GroupPlan};
@@ -11,7 +12,6 @@ use shadow_fields::field::self_visibility::{
 };
 use shadow_fields::field::sub_light::{LightPart, SeenLight};
 use shadow_fields::gpu::{Bind, Buffer, Commands, ComputePipeline};
-use shadow_fields::scene::Placement;
 use shadow_fields::sh::quadrature::random_direction;
 use shadow_fields::shaders::{Library, ShaderPermutation};
 use shadow_fields::truth::{Vertex, World};
@@ -161,12 +161,10 @@ fn by_map(map: &[u8], normal: DVec3, toward: DVec3, angle: f64) -> f64 {
 fn direct_light_is_that_of_rays() {
     const VERTICES: usize = 150;
     const LIGHTS: usize = 12;
-    let text = "[camera]\neye = [0, 0, 5]\ntarget = [0, 0, 0]\n[[mesh]]\nname = \"pot\"\nfile = \"assets/meshes/teapot.obj\"\n\
-                [[entity]]\nmesh = \"pot\"\n";
-    let scene = parse(text);
+    let pot = "[[mesh]]\nname = \"pot\"\nfile = \"assets/meshes/teapot.obj\"\n[[entity]]\nmesh = \"pot\"\n";
+    let scene = scene(pot);
     let mesh = &scene.meshes[0];
-    let placement = Placement { position: Vec3::ZERO, rotation: glam::Quat::IDENTITY, scale: 1.0 };
-    let world = World::of(&scene, &[placement]);
+    let world = World::of(&scene, &scene.at(0.0));
     let surface = bake(mesh);
     let transfer = surface.transfer.expect("some ray is blocked");
     let maps = surface.self_visibility.expect("some ray is blocked");

@@ -61,11 +61,8 @@ fn what_moves_is_merged_again_to_the_same_bits() {
             let found = gpu.light(&mut kept, &placements);
             let expected = gpu.light(&mut anew, &placements);
             assert_eq!(anew.merged().merged_clusters, anew.merged().clusters);
-            let same = |a: &[Vec<[f32; 3]>], b: &[Vec<[f32; 3]>]| {
-                let bits = |v: &[Vec<[f32; 3]>]| v.iter().flatten().flatten().map(|c| c.to_bits()).collect::<Vec<_>>();
-                bits(a) == bits(b)
-            };
-            assert!(same(&found, &expected), "round {round}, eps {eps}");
+            let bits = |v: &[Vec<[f32; 3]>]| v.iter().flatten().flatten().map(|c| c.to_bits()).collect::<Vec<_>>();
+            assert!(bits(&found) == bits(&expected), "round {round}, eps {eps}");
             let now = kept.merged();
             if round > 0 && movers.is_empty() {
                 assert_eq!(now.merged_clusters, 0, "nothing has moved");

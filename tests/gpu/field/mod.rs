@@ -89,11 +89,8 @@ fn samples_in_the_tube_are_filled_from_outside() {
 
     // Each of them is captured just off the surface instead, outside.
     let eyes = pushed_out(&surface, &positions, &marks);
-    let own: Vec<u32> = {
-        let planes = lattice.sources();
-        let find = |d: u32| planes.iter().position(|s| *s == [d]).unwrap() as u32;
-        (0..lattice.direction_count()).map(find).collect()
-    };
+    let planes = lattice.sources();
+    let own = |direction: u32| planes.iter().position(|s| *s == [direction]).unwrap() as u32;
     let directions = lattice.direction_count() as usize;
     let inside_samples = (0..positions.len()).filter(|s| marks[*s]);
     for (turn, sample) in inside_samples.enumerate() {
@@ -112,7 +109,8 @@ fn samples_in_the_tube_are_filled_from_outside() {
         };
         let scale = lattice.scale(lattice.distance(eye).max(lattice.inner)) as f32;
         let wanted = project::twin(4, FieldKind::Occlusion, px as usize, scale, texel);
-        let stored = (sample / directions) as u32 * lattice.stored_direction_count() + own[sample % directions];
+        let stored =
+            (sample / directions) as u32 * lattice.stored_direction_count() + own((sample % directions) as u32);
         for (k, wanted) in wanted.iter().enumerate() {
             let found = field.stored(stored, 0, k);
             // Two of 1 536 texels may lie on an edge.

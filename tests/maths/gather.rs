@@ -34,6 +34,7 @@ fn random_entities(rng: &mut fastrand::Rng, count: usize, spread_m: f64, corner:
             radiance: 3.0 * rng.f64(),
             facing: (i % 50 == 25).then(|| (random_direction(rng), 1.8)),
             sheet: None,
+            lamp_maps: 0,
         })
         .collect()
 }

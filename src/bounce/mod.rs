@@ -586,3 +586,25 @@ pub fn bounce_row(texels: bool, soft: bool, movers: bool) -> ShaderPermutation {
         .define("SOFT", soft)
         .define("MOVERS", movers)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The light along links of a run is the mean, by area, of that along links of its vertices.
+    #[test]
+    fn links_of_a_run_are_the_mean_of_those_of_its_vertices() {
+        let of_vertex: [&[(f32, u32)]; 3] = [&[(0.5, 7), (0.25, 2)], &[(0.125, 2), (0.0625, 9)], &[]];
+        let mut list = LinkList::default();
+        for links in of_vertex {
+            list.ranges.push([list.links.len() as u32, links.len() as u32 | 3 << COUNT_BITS]);
+            list.links.extend(links.iter().map(|&(share, run)| pack(share, run).unwrap()));
+            list.directions.extend(links.iter().map(|_| pack_direction(Vec3::Y)));
+        }
+        let linked = Linked { areas: vec![1.0, 2.0, 1.0], of_vertices: list, ..Linked::default() };
+        let joined = linked.joined_links(0..3);
+        let found: Vec<(usize, f32)> = joined.iter().map(|(link, _)| unpack(*link)).collect();
+        assert_eq!(found, [(2, 0.125), (7, 0.125), (9, 0.03125)]);
+        assert!(joined.iter().all(|(_, toward)| toward.normalize().y > 0.99));
+    }
+}

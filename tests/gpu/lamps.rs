@@ -1,7 +1,7 @@
 //! Rooms that people build and their lamps: pictures beside rays.
 
 use crate::common::{Gpu, generate, gpu, inside_out, of_cells, of_quads, part, relative_rms, reshaped};
-use crate::stage::{shines, stands};
+use crate::stage::{against_rays, shines, stands};
 use glam::{DQuat, Vec2, Vec3};
 use shadow_fields::asset::disc::Sun;
 use shadow_fields::asset::environment::EnvironmentData;
@@ -9,7 +9,7 @@ use shadow_fields::asset::{Generator, Mesh};
 use shadow_fields::bounce::Bounces;
 use shadow_fields::scene::motion::{Node, RotationData};
 use shadow_fields::scene::{Camera, EntityData, Motion, Scene, SceneBuilder};
-use shadow_fields::truth::{RayCast, World, pixels};
+use shadow_fields::truth::{RayCast, Vertex, World, pixels, receiver_vertices};
 use shadow_fields::{bake, frame};
 use std::f32::consts::TAU;
 
@@ -330,24 +330,45 @@ fn a_lampshade_has_a_soft_edge() {
     assert_near_rays(scene, 0.036);
 }
 
-/// A tube shines down from a bent sheet, which lets none of its light through (0.27 with outlines).
-#[test]
-fn no_light_comes_through_the_reflector_of_a_tube() {
+/// A tube that shines down from a bent sheet, between slabs of so many cells.
+fn tube_below_a_reflector(cells: u32) -> SceneBuilder {
     let profile = [[-0.16, -0.05], [-0.05, 0.07], [0.05, 0.07], [0.16, -0.05]];
     let at = |x: f32, [z, y]: [f32; 2]| Vec3::new(x, y, z);
     let sheets = profile.iter().zip(&profile[1..]);
     let reflector = sheets.flat_map(|(&a, &b)| [at(-0.65, a), at(0.65, a), at(0.65, b), at(-0.65, b)]);
-    let scene = Scene::builder()
+    Scene::builder()
         .camera(Camera { fov_deg: 60.0, ..Camera::new([0.4, 1.0, 2.6], [0.0, 1.1, 0.0]) })
-        .mesh("slab", generate::cuboid(Vec3::new(4.0, 0.1, 4.0), 1))
+        .mesh("slab", generate::cuboid(Vec3::new(4.0, 0.1, 4.0), cells))
         .mesh("reflector", of_quads("reflector", reflector.collect()))
         .mesh("tube", generate::cuboid(Vec3::new(1.2, 0.03, 0.03), 1))
         .entity(stands("slab", [0.0, -0.05, 0.0]))
         .entity(stands("slab", [0.0, 2.3, 0.0]))
         .entity(wall([0.0, 1.1, -1.5]))
         .entity(stands("reflector", [0.0, 1.9, 0.0]))
-        .entity(shines("tube", [0.0, 1.9, 0.0], 8.0));
-    assert_near_rays(scene, 0.22);
+        .entity(shines("tube", [0.0, 1.9, 0.0], 8.0))
+}
+
+/// None of its light comes through the sheet (0.27 with outlines).
+#[test]
+fn no_light_comes_through_the_reflector_of_a_tube() {
+    assert_near_rays(tube_below_a_reflector(1), 0.22);
+}
+
+/// The same of vertices: by outlines the slab above, which should be dark, has a third of the light below (0.016 by maps).
+#[test]
+fn no_light_comes_through_a_reflector_to_vertices() {
+    let Some(gpu) = gpu() else { return };
+    let scene = tube_below_a_reflector(24).build().unwrap();
+    let light = gpu.lit(&scene, frame::Options { bounces: Bounces::None, ..options(0) });
+    let vertices = receiver_vertices(&scene);
+    let below = |v: &&Vertex| v.entity == 0 && scene.meshes[0].normals[v.index].y > 0.5;
+    let floor: Vec<Vertex> = vertices.iter().filter(below).step_by(3).copied().collect();
+    let rays = RayCast { rays: 512, ..RayCast::default() }.run(&World::of(&scene, &scene.at(0.0)), &floor);
+    let error = against_rays(&light, &floor, &rays);
+    let mean =
+        |entity: usize| light[entity].iter().map(|rgb| f64::from(rgb[0])).sum::<f64>() / light[entity].len() as f64;
+    let above = mean(1) / mean(0);
+    assert!(error < 0.24 && above < 0.03, "{error}, above {above} of below");
 }
 
 /// A lamp in a thin box hangs right below a slab: nothing of its light gets above that.

@@ -38,9 +38,9 @@
 //!   `static`, every entity is alone.
 //! - Surfaces: a mesh is lit and drawn with more vertices where its own visibility varies, and along the shadows of suns
 //!   ([`bake::surfaces`]). Vertices of what rests know from rays whether its own group hides a sun. Pixels that evaluate
-//!   lights look up a map of all that rests as the sun sees it ([`draw::sun_map`]), and maps around lamps in fittings or
-//!   among many things ([`draw::lamp_map`]); outlines hide lights for vertices, where something moves, and where the light
-//!   or something that rested has moved since.
+//!   lights look up a map of all that rests as the sun sees it ([`draw::sun_map`]); they and vertices look up maps around
+//!   lamps in fittings or among many things ([`draw::lamp_map`]). Outlines tell the rest: suns at vertices that rays leave
+//!   undecided, what moves, and everything once the light or something that rested has moved.
 //! - Entities: everything receives, and everything but emitters occludes. Each can be set per entity. Scales are uniform
 //!   and positive.
 //! - Transparency: what lets light through blocks its opacity's share of a field or an outline. It stands before all

@@ -1,5 +1,5 @@
 //! Cube maps of what rests around the parts of lamps that rest: how near the nearest surface is. They are drawn once,
-//! and tell the pixels that evaluate lights how much of each part they see past it (`glsl/lamp_map.glsl`).
+//! and tell vertices, and pixels that evaluate lights, how much of each part they see past it (`glsl/lamp_map.glsl`).
 //!
 //! Outlines of 32 texels let light through thin bent sheets, as the reflectors around tubes are, and a pixel looks up
 //! those of all that may stand before a lamp: among 797 things 470 stand on a list of a wall, of which 26 are looked up

@@ -242,7 +242,9 @@ impl<'s> World<'s> {
         let others = self.occluders(view);
         let (panes, others): (Vec<_>, Vec<_>) =
             others.iter().chain(&view.own).partition(|sight| self.scene.entities[sight.entity].transparent);
-        let met = others.into_iter().filter_map(|sight| Some((sight, self.first_hit_m(sight, direction)?)));
+        let may_meet = |sight: &&EntityView| sight.entry(direction.as_vec3a(), 1.0).is_some();
+        let met = others.into_iter().filter(may_meet);
+        let met = met.filter_map(|sight| Some((sight, self.first_hit_m(sight, direction)?)));
         let (sight, limit_m) = met.min_by(|a, b| a.1.total_cmp(&b.1))?;
         let lamps = self.lights(view);
         let is_kept_back = panes.into_iter().chain(&lamps).any(|sight| self.blocks(sight, direction, limit_m));
@@ -326,8 +328,11 @@ impl EntityView {
         if self.beyond <= 0.0 || other.beyond <= 0.0 {
             return true;
         }
-        let half_angle = |sight: &EntityView| (1.0 / sight.toward.as_dvec3().length()).asin();
-        self.toward.as_dvec3().angle_between(other.toward.as_dvec3()) < half_angle(self) + half_angle(other)
+        // The cosine of the angle between their axes against that of the sum of their half-angles, whose sines are the
+        // inverses of the distances, times both distances.
+        let [a, b] = [self, other].map(|sight| sight.toward.as_dvec3());
+        let cosines = (a.length_squared() - 1.0) * (b.length_squared() - 1.0);
+        a.dot(b) > cosines.max(0.0).sqrt() - 1.0
     }
 
     /// Distance (in bounding radii) at which a ray enters a sphere of that radius (in bounding radii) around the

@@ -50,10 +50,13 @@ pub(crate) fn check_size(path: &Path, size: usize, limit_bytes: u64, what: &str)
 /// The content of a file as text, as far as it is not too large.
 pub(crate) fn utf8<'b>(path: &Path, bytes: &'b [u8], limit_bytes: u64, what: &str) -> Result<&'b str> {
     check_size(path, bytes.len(), limit_bytes, what)?;
-    std::str::from_utf8(bytes).map_err(|error| {
-        let line = 1 + bytes[..error.valid_up_to()].iter().filter(|&&b| b == b'\n').count();
-        Error::input_at(path, line, "not UTF-8 text")
-    })
+    std::str::from_utf8(bytes)
+        .map_err(|error| Error::input_at(path, line_of(bytes, error.valid_up_to()), "not UTF-8 text"))
+}
+
+/// The line that holds a byte of a text, counted from 1.
+pub(crate) fn line_of(text: &[u8], byte: usize) -> usize {
+    1 + text[..byte.min(text.len())].iter().filter(|&&b| b == b'\n').count()
 }
 
 /// Reads a file of at most `limit_bytes`, whatever length the file system reports (see [`crate::files::open`]).

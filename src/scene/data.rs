@@ -53,9 +53,9 @@ use super::gloss::{Gloss, Maps};
 use super::light::Spot;
 use super::motion::{Motion, Placement, PlacementF64, RotationData};
 use super::{check_counts, values};
-use crate::asset::Generator;
 use crate::asset::environment::EnvironmentData;
 use crate::asset::texture::{Texture, Wrap};
+use crate::asset::{Generator, line_of};
 use crate::error::{Error, Result, one_line};
 
 /// Largest width or height of a picture, in pixels.
@@ -494,7 +494,7 @@ impl Data {
     /// [`Error::Input`] in one line, which names the file and the line.
     pub fn parse(text: &str, path: &Path) -> Result<Self> {
         let data: Data = toml::from_str(text).map_err(|e| {
-            let line = e.span().map_or(1, |span| line_of(text, span.start));
+            let line = e.span().map_or(1, |span| line_of(text.as_bytes(), span.start));
             Error::input_at(path, line, plain(&flat(e.message())))
         })?;
         check_counts(data.meshes.len(), data.entities.len()).map_err(|what| Error::input(path, what))?;
@@ -534,9 +534,4 @@ fn plain(message: &str) -> String {
     let Some((before, rest)) = message.split_once("expected struct ") else { return message.to_owned() };
     let after = rest.find(|c: char| !c.is_alphanumeric() && c != '_').map_or("", |end| &rest[end..]);
     format!("{before}expected a table {{ ... }}{after}")
-}
-
-/// The line that holds a byte of `text`, counted from 1.
-pub(super) fn line_of(text: &str, byte: usize) -> usize {
-    1 + text.as_bytes()[..byte.min(text.len())].iter().filter(|&&b| b == b'\n').count()
 }

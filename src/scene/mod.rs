@@ -31,7 +31,7 @@ use crate::asset::enclose::around_boxes;
 use crate::asset::environment::{Environment, EnvironmentData};
 use crate::asset::pierce::pierced;
 use crate::asset::texture::{Texels, Texture};
-use crate::asset::{Mesh, embedded, obj, read_file, utf8};
+use crate::asset::{Mesh, embedded, line_of, obj, read_file, utf8};
 use crate::error::{Error, Result};
 pub use builder::{SceneBuilder, Shape};
 pub use data::{Albedo, Camera, Data, EntityData, MeshData, Output, TextureData};
@@ -759,6 +759,6 @@ impl<'a> TableLines<'a> {
     }
 
     fn of(&self, table: Option<&Spanned<toml::Table>>) -> usize {
-        table.map_or(1, |t| data::line_of(self.text, t.span().start))
+        table.map_or(1, |t| line_of(self.text.as_bytes(), t.span().start))
     }
 }

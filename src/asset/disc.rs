@@ -1,15 +1,14 @@
 //! Distant discs of light: suns.
 
-use super::short;
-use crate::error::{Error, Result};
 use glam::{DVec3, Vec3};
 use serde::{Deserialize, Serialize};
 use std::f64::consts::TAU;
+use std::ops::RangeInclusive;
 
 /// The sun's angular diameter seen from the earth, degrees.
 pub const SUN_DEG: f32 = 0.53;
 /// Angular diameters that a disc may have, degrees.
-const ANGLES_DEG: (f32, f32) = (0.01, 90.0);
+pub(super) const ANGLES_DEG: RangeInclusive<f32> = 0.01..=90.0;
 
 /// A distant disc of one radiance, as data.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -30,15 +29,6 @@ fn sun_deg() -> f32 {
 }
 
 impl Sun {
-    /// Checks angle and direction; radiance is checked as that of all parts is.
-    pub(super) fn check(&self) -> Result<()> {
-        check_angle("sun angle_deg", self.angle_deg)?;
-        if self.toward.as_dvec3().try_normalize().is_none() {
-            return Err(Error::Input("environment sun has no direction towards it".into()));
-        }
-        Ok(())
-    }
-
     pub fn disc(&self) -> Disc {
         Disc {
             name: "sun",
@@ -47,15 +37,6 @@ impl Sun {
             radiance: self.radiance.as_dvec3(),
         }
     }
-}
-
-pub(super) fn check_angle(what: &str, angle_deg: f32) -> Result<()> {
-    let (low, high) = ANGLES_DEG;
-    if (low..=high).contains(&angle_deg) {
-        return Ok(());
-    }
-    let angle = short(angle_deg);
-    Err(Error::Input(format!("environment {what} {angle} is not within {low} to {high}")))
 }
 
 #[derive(Clone, Copy, Debug, PartialEq)]

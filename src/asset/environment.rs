@@ -2,13 +2,14 @@
 //! bright discs are kept apart.
 
 use std::f64::consts::{PI, TAU};
+use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use glam::{DQuat, DVec3, Vec3};
 use serde::{Deserialize, Serialize};
 
-use super::disc::{Disc, Sun};
+use super::disc::{ANGLES_DEG, Disc, Sun};
 use super::equirect::Equirect;
 use super::peak::WINDOW_NAME;
 use super::short;
@@ -71,15 +72,23 @@ fn is_one(value: &f32) -> bool {
     *value == 1.0
 }
 
+/// Refuses a number of an environment that is out of its range.
+pub(super) fn check_range(what: &str, value: f32, range: RangeInclusive<f32>) -> Result<()> {
+    if range.contains(&value) {
+        return Ok(());
+    }
+    let [value, low, high] = [value, *range.start(), *range.end()].map(short);
+    Err(Error::Input(format!("environment {what} {value} is not within {low} to {high}")))
+}
+
 impl EnvironmentData {
     fn check(&self) -> Result<()> {
-        let amount = |what: &str, values: &[f32]| match values.iter().find(|v| !(0.0..=RADIANCE_LIMIT).contains(*v)) {
-            Some(bad) => Err(Error::Input(format!(
-                "environment {what} {} is not within 0 to {}",
-                short(*bad),
-                short(RADIANCE_LIMIT)
-            ))),
-            None => Ok(()),
+        let amount = |what: &str, values: &[f32]| {
+            values.iter().try_for_each(|value| check_range(what, *value, 0.0..=RADIANCE_LIMIT))
+        };
+        let directed = |what: &str, toward: Vec3| match toward.as_dvec3().try_normalize() {
+            Some(_) => Ok(()),
+            None => Err(Error::Input(format!("environment {what} has no direction towards it"))),
         };
         amount("strength", &[self.strength])?;
         if !(-TURN_LIMIT_DEG..=TURN_LIMIT_DEG).contains(&self.turn_deg) {
@@ -105,9 +114,7 @@ impl EnvironmentData {
             if key.sharpness > 1e5 {
                 return Err(Error::Input("environment key sharpness is over the limit of 1e5".into()));
             }
-            if key.toward.as_dvec3().try_normalize().is_none() {
-                return Err(Error::Input("environment key has no direction towards it".into()));
-            }
+            directed("key", key.toward)?;
         }
         if let Some(sky) = &self.sky {
             sky.check()?;
@@ -115,7 +122,8 @@ impl EnvironmentData {
         }
         if let Some(sun) = &self.sun {
             amount("sun radiance", &sun.radiance.to_array())?;
-            sun.check()?;
+            check_range("sun angle_deg", sun.angle_deg, ANGLES_DEG)?;
+            directed("sun", sun.toward)?;
             self.within("sun", f64::from(sun.radiance.max_element()))?;
         }
         self.image.as_ref().map_or(Ok(()), |image| amount("image scale", &[image.scale]))

@@ -10,10 +10,9 @@ use std::f64::consts::{FRAC_PI_2, PI, TAU};
 use glam::{DMat3, DVec3, Vec3};
 use serde::{Deserialize, Serialize};
 
-use super::disc::{Disc, SUN_DEG, check_angle};
-use super::environment::RADIANCE_LIMIT;
-use super::short;
-use crate::error::{Error, Result};
+use super::disc::{ANGLES_DEG, Disc, SUN_DEG};
+use super::environment::{RADIANCE_LIMIT, check_range};
+use crate::error::Result;
 use crate::sh::basis::{self, MAX_BANDS, MAX_COEFFICIENTS};
 use crate::sh::quadrature::gauss_legendre;
 
@@ -61,22 +60,13 @@ impl Default for Sky {
 
 impl Sky {
     pub(super) fn check(&self) -> Result<()> {
-        let range = |what: &str, value: f32, low: f32, high: f32| match (low..=high).contains(&value) {
-            true => Ok(()),
-            false => Err(Error::Input(format!(
-                "environment sky {what} {} is not within {} to {}",
-                short(value),
-                short(low),
-                short(high)
-            ))),
-        };
-        range("sun_elevation_deg", self.sun_elevation_deg, 0.0, 90.0)?;
-        range("sun_azimuth_deg", self.sun_azimuth_deg, -360.0, 360.0)?;
-        range("turbidity", self.turbidity, 2.0, 10.0)?;
-        range("radiance", self.radiance, 0.0, RADIANCE_LIMIT)?;
-        range("sun", self.sun, 0.0, 1e6)?;
-        check_angle("sky sun_angle_deg", self.sun_angle_deg)?;
-        self.ground.to_array().into_iter().try_for_each(|c| range("ground", c, 0.0, 1.0))
+        check_range("sky sun_elevation_deg", self.sun_elevation_deg, 0.0..=90.0)?;
+        check_range("sky sun_azimuth_deg", self.sun_azimuth_deg, -360.0..=360.0)?;
+        check_range("sky turbidity", self.turbidity, 2.0..=10.0)?;
+        check_range("sky radiance", self.radiance, 0.0..=RADIANCE_LIMIT)?;
+        check_range("sky sun", self.sun, 0.0..=1e6)?;
+        check_range("sky sun_angle_deg", self.sun_angle_deg, ANGLES_DEG)?;
+        self.ground.to_array().into_iter().try_for_each(|c| check_range("sky ground", c, 0.0..=1.0))
     }
 }
 

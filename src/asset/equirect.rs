@@ -97,16 +97,10 @@ impl Equirect {
             taken: Vec::new(),
             coefficients: Default::default(),
         };
-        (picture.lights, picture.taken) = picture.take_out_lights();
+        let size = picture.size();
+        (picture.lights, picture.taken) = Sky::new(&mut picture.texels, size).take_out_lights();
         picture.coefficients = picture.project();
         Ok(picture)
-    }
-
-    fn take_out_lights(&mut self) -> (Vec<Disc>, Vec<(usize, [f32; 3])>) {
-        let width = self.width as f64;
-        let height = self.height as f64;
-        let direction = |x: usize, y: usize| direction((x as f64 + 0.5) / width, (y as f64 + 0.5) / height);
-        Sky::new(&mut self.texels, [self.width, self.height], &direction).take_out_lights()
     }
 
     /// Width and height, texels.

@@ -5,6 +5,7 @@
 //! The picture keeps the rest. Together they send as much light as the whole picture.
 
 use super::disc::Disc;
+use super::equirect::direction;
 use glam::DVec3;
 use std::f64::consts::{PI, TAU};
 
@@ -42,32 +43,29 @@ pub(super) struct Sky<'t> {
     height: usize,
     /// Of a texel of each row, steradians.
     solid_angles: Vec<f64>,
-    /// Unit direction of the middle of a texel, by column and row.
-    direction: &'t dyn Fn(usize, usize) -> DVec3,
     /// By texel, row by row, the radiance that was taken out.
     taken: Vec<(usize, [f32; 3])>,
 }
 
 impl<'t> Sky<'t> {
-    pub fn new(
-        texels: &'t mut [[f32; 3]],
-        [width, height]: [usize; 2],
-        direction: &'t dyn Fn(usize, usize) -> DVec3,
-    ) -> Self {
+    pub fn new(texels: &'t mut [[f32; 3]], [width, height]: [usize; 2]) -> Self {
         let solid_angle = |y: usize| {
             let [north, south] = [y, y + 1].map(|y| (y as f64 * PI / height as f64).cos());
             (north - south) * TAU / width as f64
         };
         let solid_angles = (0..height).map(solid_angle).collect();
-        Sky { texels, width, height, solid_angles, direction, taken: Vec::new() }
+        Sky { texels, width, height, solid_angles, taken: Vec::new() }
     }
 
     fn solid_angle(&self, index: usize) -> f64 {
         self.solid_angles[index / self.width]
     }
 
+    /// Unit direction of the middle of a texel.
     fn toward(&self, index: usize) -> DVec3 {
-        (self.direction)(index % self.width, index / self.width)
+        let column = (index % self.width) as f64 + 0.5;
+        let row = (index / self.width) as f64 + 0.5;
+        direction(column / self.width as f64, row / self.height as f64)
     }
 
     fn whole(&self) -> f64 {

@@ -1,7 +1,7 @@
 //! Slender pieces of meshes as chains of boxes: bars, rails, cables, legs. They block light in closed form, where maps of
 //! outlines, of 32 texels across the whole mesh, have no place for them.
 
-use super::mesh::{Mesh, area_m2};
+use super::mesh::{Mesh, area_m2, twice_area_m2};
 use super::topology;
 use crate::field::cuboid::{Cuboid, PlacedCuboid};
 use glam::{DMat3, DVec3, Vec3};
@@ -102,12 +102,7 @@ struct Part {
 impl Part {
     fn new(positions: &[Vec3], triangles: &[[u32; 3]]) -> Self {
         let corners = || triangles.iter().flatten().map(|v| positions[*v as usize].as_dvec3());
-        let sides = || {
-            triangles.iter().map(|t| {
-                let [a, b, c] = t.map(|v| positions[v as usize].as_dvec3());
-                (b - a).cross(c - a) / 2.0
-            })
-        };
+        let sides = || triangles.iter().map(|triangle| twice_area_m2(positions, triangle) / 2.0);
         let x = longest_axis(corners);
         let is_side = |normal: &DVec3| normal.dot(x).abs() < END * normal.length();
         let widest = sides().filter(is_side).max_by(|a, b| a.length_squared().total_cmp(&b.length_squared()));

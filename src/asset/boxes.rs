@@ -5,7 +5,7 @@
 //! that share a face are in one box: where boxes only touched, light would pass between them, since each takes its own
 //! share of a light.
 
-use super::mesh::Mesh;
+use super::mesh::{Mesh, twice_area_m2};
 use super::outline::{SQUARE, square_axes};
 use crate::field::cuboid::{Cuboid, PlacedCuboid};
 use glam::{DMat3, DVec2, DVec3};
@@ -44,11 +44,7 @@ struct Cells {
 
 impl Cells {
     fn new(mesh: &Mesh) -> Option<Self> {
-        let corners = |t: &[u32; 3]| t.map(|v| mesh.positions[v as usize].as_dvec3());
-        let normal = |t: &[u32; 3]| {
-            let [a, b, c] = corners(t);
-            (b - a).cross(c - a).try_normalize()
-        };
+        let normal = |t: &[u32; 3]| twice_area_m2(&mesh.positions, t).try_normalize();
         let [x, y, z] = square_axes(mesh.triangles.iter().filter_map(normal))?;
         let axes = DMat3::from_cols(x, y, z);
         // Along which axis each face looks, its place there, and which way.
@@ -57,7 +53,7 @@ impl Cells {
             let Some(normal) = normal(triangle) else { continue };
             let local = axes.transpose() * normal;
             let axis = (0..3).find(|axis| local[*axis].abs() > 1.0 - SQUARE)?;
-            let places = corners(triangle).map(|corner| axes.transpose() * corner);
+            let places = triangle.map(|v| axes.transpose() * mesh.positions[v as usize].as_dvec3());
             let flat = places.map(|p| DVec2::new(p[(axis + 1) % 3], p[(axis + 2) % 3]));
             faces[axis].push((places.iter().map(|p| p[axis]).sum::<f64>() / 3.0, local[axis].signum(), flat));
         }

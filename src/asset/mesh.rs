@@ -84,14 +84,11 @@ impl Attributes {
 
     /// Adds the attributes of a vertex halfway between two others.
     pub(crate) fn add_middle(&mut self, a: usize, b: usize) {
-        if let Some(colors) = &mut self.colors {
+        for colors in self.colors.iter_mut().chain(&mut self.tints) {
             colors.push(0.5 * (colors[a] + colors[b]));
         }
         if let Some(uvs) = &mut self.uvs {
             uvs.push(0.5 * (uvs[a] + uvs[b]));
-        }
-        if let Some(tints) = &mut self.tints {
-            tints.push(0.5 * (tints[a] + tints[b]));
         }
     }
 }
@@ -498,11 +495,13 @@ fn is_unit(normal: Vec3) -> bool {
 }
 
 pub(crate) fn area_m2(positions: &[Vec3], triangles: &[[u32; 3]]) -> f64 {
-    let area = |t: &[u32; 3]| {
-        let [a, b, c] = t.map(|i| positions[i as usize].as_dvec3());
-        0.5 * (b - a).cross(c - a).length()
-    };
-    triangles.iter().map(area).sum()
+    triangles.iter().map(|triangle| 0.5 * twice_area_m2(positions, triangle).length()).sum()
+}
+
+/// Twice the area of a triangle, along its normal.
+pub(crate) fn twice_area_m2(positions: &[Vec3], triangle: &[u32; 3]) -> DVec3 {
+    let [a, b, c] = triangle.map(|v| positions[v as usize].as_dvec3());
+    (b - a).cross(c - a)
 }
 
 fn hash(positions: &[Vec3], normals: &[Vec3], attributes: &Attributes, triangles: &[[u32; 3]]) -> [u8; 32] {

@@ -3,7 +3,7 @@
 #[cfg(feature = "decoders")]
 use super::decode::check_size;
 use super::decode::decode;
-use super::mesh::Mesh;
+use super::mesh::{Mesh, twice_area_m2};
 use super::picture::{linear_from_srgb, srgb_from_linear};
 #[cfg(feature = "decoders")]
 use crate::error::Error;
@@ -252,8 +252,7 @@ impl Texture {
         let mut sum = DVec3::ZERO;
         let mut whole = 0.0;
         for triangle in &mesh.triangles {
-            let [a, b, c] = triangle.map(|v| mesh.positions[v as usize].as_dvec3());
-            let area = (b - a).cross(c - a).length();
+            let area = twice_area_m2(&mesh.positions, triangle).length();
             let cuts = coordinates.map_or(1, |(texels, uvs)| texels.cuts(triangle.map(|v| uvs[v as usize])));
             let color: Vec3 = middles(cuts).map(|weights| at(*triangle, weights)).sum();
             sum += area * (color / (cuts * cuts) as f32).as_dvec3();

@@ -10,8 +10,8 @@ use super::accessor;
 use super::document::Document;
 use super::notes::Notes;
 use super::pose::Pose;
-use crate::asset::mesh::{Attributes, TRIANGLE_LIMIT, area_m2};
-use crate::asset::{Mesh, enclose};
+use crate::asset::mesh::{Attributes, TRIANGLE_LIMIT, area_m2, twice_area_m2};
+use crate::asset::{Mesh, enclose, topology};
 use crate::error::Result;
 
 /// The triangles of a primitive. Where it has no normals, every triangle has vertices of its own with its own normal,
@@ -220,13 +220,9 @@ fn triangles(mode: Mode, corners: &[u32]) -> std::result::Result<Vec<[u32; 3]>, 
 
 /// Triangles that share no vertex.
 fn flat(place: String, positions: &[Vec3], triangles: &[[u32; 3]], attributes: HashMap<Semantic, usize>) -> Shape {
-    let source: Vec<u32> = triangles.as_flattened().to_vec();
-    let apart: Vec<Vec3> = source.iter().map(|i| positions[*i as usize]).collect();
-    let normal = |t: &[Vec3]| {
-        let [a, b, c] = [t[0], t[1], t[2]].map(|p| p.as_dvec3());
-        [(b - a).cross(c - a).normalize_or_zero().as_vec3(); 3]
-    };
-    let normals = apart.chunks_exact(3).flat_map(normal).collect();
-    let triangles = (0..triangles.len() as u32).map(|t| [3 * t, 3 * t + 1, 3 * t + 2]).collect();
-    Shape { place, positions: apart, normals, triangles, source, attributes }
+    let normal = |triangle| [twice_area_m2(positions, triangle).normalize_or_zero().as_vec3(); 3];
+    let normals = triangles.iter().flat_map(normal).collect();
+    let source = triangles.as_flattened().to_vec();
+    let (positions, triangles) = topology::apart(positions, triangles);
+    Shape { place, positions, normals, triangles, source, attributes }
 }

@@ -1,6 +1,6 @@
 //! Topology of a mesh after equal positions are welded.
 
-use std::collections::HashMap;
+use std::collections::{BTreeMap, HashMap};
 
 use super::enclose;
 use glam::{DVec3, Vec3};
@@ -218,36 +218,29 @@ fn is_doubled(edges: &[&[HalfEdge]], positions: &[Vec3], triangles: &[[u32; 3]])
     })
 }
 
-/// The piece that each triangle belongs to; pieces are numbered by their first triangles.
-pub fn piece_numbers(positions: &[Vec3], triangles: &[[u32; 3]]) -> Vec<u32> {
-    let sides = sides(&weld(positions, triangles).0);
-    let edges: Vec<&[HalfEdge]> = edges(&sides).collect();
-    if is_doubled(&edges, positions, triangles) {
-        return vec![0; triangles.len()];
-    }
-    let mut pieces = Sets::new(triangles.len());
-    for [a, b] in edges.iter().flat_map(|edge| mates(edge, positions, triangles)) {
-        pieces.join(a as usize / 3, b as usize / 3);
-    }
-    let mut numbers = HashMap::new();
-    let mut number = |triangle: usize| {
-        let next = numbers.len() as u32;
-        *numbers.entry(pieces.root(triangle)).or_insert(next)
-    };
-    (0..triangles.len()).map(&mut number).collect()
-}
-
 /// A few of many triangles, by their numbers.
 pub fn subset(triangles: &[[u32; 3]], piece: &[u32]) -> Vec<[u32; 3]> {
     piece.iter().map(|triangle| triangles[*triangle as usize]).collect()
 }
 
-/// The pieces that hang together: the numbers of their triangles.
+/// The pieces that hang together, in the order of their first triangles: the numbers of their triangles.
 pub fn loose(positions: &[Vec3], triangles: &[[u32; 3]]) -> Vec<Vec<u32>> {
-    let numbers = piece_numbers(positions, triangles);
-    let mut pieces = vec![Vec::new(); numbers.iter().max().map_or(0, |last| *last as usize + 1)];
-    (0..).zip(numbers).for_each(|(triangle, number)| pieces[number as usize].push(triangle));
-    pieces
+    let sides = sides(&weld(positions, triangles).0);
+    let edges: Vec<&[HalfEdge]> = edges(&sides).collect();
+    let mut sets = Sets::new(triangles.len());
+    if is_doubled(&edges, positions, triangles) {
+        (1..triangles.len()).for_each(|triangle| sets.join(0, triangle));
+    } else {
+        for [a, b] in edges.iter().flat_map(|edge| mates(edge, positions, triangles)) {
+            sets.join(a as usize / 3, b as usize / 3);
+        }
+    }
+    // The root of a set is its first triangle.
+    let mut pieces = BTreeMap::<usize, Vec<u32>>::new();
+    for triangle in 0..triangles.len() {
+        pieces.entry(sets.root(triangle)).or_default().push(triangle as u32);
+    }
+    pieces.into_values().collect()
 }
 
 /// Whether every piece of a closed surface is wound outwards, so that none is the wall of a cavity or inside out.

@@ -4,7 +4,6 @@ use super::data::{Camera, EntityData};
 use super::gltf::pieces;
 use super::{Scene, SceneBuilder};
 use crate::asset::environment::EnvironmentData;
-use crate::asset::mesh::Attributes;
 use crate::asset::sky::Sky;
 use crate::asset::{Generator, Mesh};
 use crate::error::{Error, Result};
@@ -43,14 +42,13 @@ impl Apart {
     /// # Errors
     /// [`Error::Input`] in one line where there is no such piece.
     pub fn piece(&self, piece: u32) -> Result<Mesh> {
-        let Mesh { name, positions, normals, colors, uvs, tints, .. } = &self.whole;
+        let Mesh { name, positions, normals, .. } = &self.whole;
         let numbered = self.whole.triangles.iter().zip(&self.numbers);
         let own: Vec<[u32; 3]> = numbered.filter(|(_, number)| **number == piece).map(|(of, _)| *of).collect();
         if own.is_empty() {
             return Err(Error::Input(format!("there is no piece {piece}: it has {}", self.count())));
         }
-        let attributes = Attributes { colors: colors.clone(), uvs: uvs.clone(), tints: tints.clone() };
-        Mesh::with_attributes(name, positions.clone(), normals.clone(), attributes, own)
+        Mesh::with_attributes(name, positions.clone(), normals.clone(), self.whole.attributes(), own)
     }
 }
 

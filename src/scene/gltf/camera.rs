@@ -7,6 +7,7 @@ use glam::{DVec3, Vec3};
 use super::document::Document;
 use super::notes::Notes;
 use super::tree::Stand;
+use crate::asset::enclose::around_boxes;
 use crate::error::Result;
 use crate::scene::data::{Camera, EntityData, Output};
 
@@ -83,15 +84,11 @@ pub fn camera(
 
 /// A sphere around entities at time 0: centre and radius in metres. Each is its mesh's bounding sphere and its data.
 pub fn bounds<'a>(entities: impl Iterator<Item = ((Vec3, f32), &'a EntityData)>) -> (DVec3, f64) {
-    let mut low = DVec3::INFINITY;
-    let mut high = DVec3::NEG_INFINITY;
-    for (sphere, entity) in entities {
+    let boxes = entities.map(|(sphere, entity)| {
         let (centre, radius_m) = entity.at(0.0).sphere(sphere);
-        (low, high) = (low.min(centre - radius_m), high.max(centre + radius_m));
-    }
-    if low.x > high.x {
-        return (DVec3::ZERO, 1.0);
-    }
+        [centre - radius_m, centre + radius_m]
+    });
+    let Some([low, high]) = around_boxes(boxes) else { return (DVec3::ZERO, 1.0) };
     // The box of the spheres is larger than what is in them.
     ((low + high) / 2.0, ((high - low).length() / 2.0 / 3.0_f64.sqrt() * 1.2).max(1e-3))
 }

@@ -6,6 +6,7 @@ use glam::{DAffine3, DVec3, Vec3};
 use super::document::Document;
 use super::shape::Shape;
 use crate::asset::Mesh;
+use crate::asset::enclose::around_boxes;
 use crate::asset::mesh::Attributes;
 use crate::error::Result;
 
@@ -63,8 +64,7 @@ const WIDEST: f64 = 0.1;
 /// Groups of neighbours of one kind, `count` to twice as many in all and one more a kind, each of at most
 /// `triangle_limit` triangles or of one candidate. Wide ones are in none.
 pub fn neighbours<K: Ord>(mut candidates: Vec<Candidate<K>>, count: usize, triangle_limit: usize) -> Vec<Vec<usize>> {
-    let (low, high) = extent(&candidates);
-    let edge = (high - low).max_element();
+    let edge = extent(&candidates).max_element();
     candidates.retain(|c| c.radius_m <= WIDEST * edge);
     candidates.sort_by(|a, b| a.kind.cmp(&b.kind));
     let size = candidates.len().div_ceil(count);
@@ -82,17 +82,16 @@ pub fn halve<K>(group: &mut [Candidate<K>], out: &mut Vec<Vec<usize>>, fits: &im
     if group.len() == 1 || fits(group) {
         return out.push(group.iter().map(|c| c.part).collect());
     }
-    let (low, high) = extent(group);
-    let axis = (high - low).max_position();
+    let axis = extent(group).max_position();
     group.sort_by(|a, b| a.centre[axis].total_cmp(&b.centre[axis]));
     let (before, behind) = group.split_at_mut(group.len() / 2);
     halve(before, out, fits);
     halve(behind, out, fits);
 }
 
-fn extent<K>(candidates: &[Candidate<K>]) -> (DVec3, DVec3) {
-    let low = candidates.iter().fold(DVec3::INFINITY, |low, c| low.min(c.centre));
-    (low, candidates.iter().fold(DVec3::NEG_INFINITY, |high, c| high.max(c.centre)))
+/// Edges of the box around all centres.
+fn extent<K>(candidates: &[Candidate<K>]) -> DVec3 {
+    around_boxes(candidates.iter().map(|c| [c.centre; 2])).map_or(DVec3::ZERO, |[low, high]| high - low)
 }
 
 #[cfg(test)]

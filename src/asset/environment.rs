@@ -68,7 +68,7 @@ pub(crate) fn one() -> f32 {
     1.0
 }
 
-fn is_one(value: &f32) -> bool {
+pub(crate) fn is_one(value: &f32) -> bool {
     *value == 1.0
 }
 

@@ -421,7 +421,7 @@ pub struct EntityData {
     pub maps: Maps,
     /// Share of light that does not pass, 0 to 1, and a factor on the albedo: less than 1 for glass and for what is
     /// blended with what lies behind it. The default is 1.
-    #[serde(default = "values::one", deserialize_with = "values::share", skip_serializing_if = "is_opaque")]
+    #[serde(default = "values::one", deserialize_with = "values::share", skip_serializing_if = "values::is_one")]
     pub opacity: f32,
     /// Linear radiance in W m^-2 sr^-1, at most 1e15. It multiplies the colours of a mesh that has them. The default is
     /// 0.
@@ -442,10 +442,6 @@ pub struct EntityData {
     /// `false`: it moves as `motion` has it.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub movable: bool,
-}
-
-fn is_opaque(opacity: &f32) -> bool {
-    *opacity >= 1.0
 }
 
 fn grey() -> Albedo {

@@ -1,7 +1,7 @@
 //! Numbers of a scene file, checked while they are read, so that a message names the line of the number.
 
 use crate::asset::environment::RADIANCE_LIMIT;
-pub(super) use crate::asset::environment::one;
+pub(super) use crate::asset::environment::{is_one, one};
 use crate::asset::short;
 use glam::Vec3;
 use serde::de::{Deserialize, Deserializer, Error};

@@ -12,12 +12,12 @@ use serde::{Deserialize, Serialize};
 use super::disc::{ANGLES_DEG, Disc, Sun};
 use super::equirect::Equirect;
 use super::peak::WINDOW_NAME;
-use super::short;
 use super::sky::{Dome, Sky};
 use crate::error::{Error, Result};
 use crate::sh::basis::Y00;
 use crate::sh::lobe;
 use crate::sh::rotation::Rotation;
+use crate::text::short;
 
 /// Largest radiance, and largest of its factors. Its square still fits f32.
 pub const RADIANCE_LIMIT: f32 = 1e15;
@@ -256,7 +256,7 @@ impl Environment {
     pub fn discs(&self) -> Vec<Disc> {
         let EnvironmentData { sun, image, strength, .. } = &self.source;
         let mut all: Vec<Disc> =
-            sun.as_ref().map(Sun::disc).into_iter().chain(self.dome.as_ref().map(|dome| dome.disc())).collect();
+            sun.as_ref().map(Sun::disc).into_iter().chain(self.dome.as_ref().map(|dome| dome.sun)).collect();
         if let (Some(picture), Some(image)) = (&self.picture, image) {
             let scaled = |disc: &Disc| Disc { radiance: disc.radiance * f64::from(image.scale), ..*disc };
             all.extend(picture.lights.iter().map(scaled));

@@ -7,7 +7,6 @@ use std::io::Read as _;
 use std::path::Path;
 
 use crate::error::{Error, Result};
-pub use crate::text::short;
 
 pub mod backdrop;
 pub mod bars;

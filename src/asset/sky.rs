@@ -72,10 +72,7 @@ impl Sky {
 
 #[derive(Clone, Debug)]
 pub struct Dome {
-    sun: DVec3,
-    sun_half_angle_rad: f64,
-    /// Linear RGB radiance of the sun's disc.
-    sun_radiance: DVec3,
+    pub sun: Disc,
     /// Perez coefficients A to E of Y, x and y.
     perez: [[f64; 5]; 3],
     /// Y, x and y at the zenith, each divided by the Perez function there.
@@ -94,15 +91,14 @@ impl Dome {
         let elevation = f64::from(sky.sun_elevation_deg).to_radians();
         let polar = FRAC_PI_2 - elevation;
         let (across, ahead) = f64::from(sky.sun_azimuth_deg).to_radians().sin_cos();
-        let sun = DVec3::new(across * polar.sin(), polar.cos(), -ahead * polar.sin());
+        let toward = DVec3::new(across * polar.sin(), polar.cos(), -ahead * polar.sin());
+        let half_angle_rad = f64::from(sky.sun_angle_deg).to_radians() / 2.0;
         let perez = perez(turbidity);
         let mut zenith = zenith(turbidity, polar);
         zenith.iter_mut().zip(&perez).for_each(|(value, p)| *value /= distribution(p, 1.0, polar));
 
         let mut dome = Dome {
-            sun,
-            sun_half_angle_rad: f64::from(sky.sun_angle_deg).to_radians() / 2.0,
-            sun_radiance: DVec3::ZERO,
+            sun: Disc { name: "sun of the sky", toward, half_angle_rad, radiance: DVec3::ZERO },
             perez,
             zenith,
             scale: 1.0,
@@ -121,9 +117,9 @@ impl Dome {
         let depth = AIR_DEPTH + HAZE_DEPTH * (turbidity - 1.0);
         let hue = (-depth * air_mass).exp();
         // Irradiance of a disc of radiance 1 on a surface that faces it, over pi.
-        let facing = dome.sun_half_angle_rad.sin().powi(2);
-        dome.sun_radiance = hue / luminance(hue) * (f64::from(sky.sun * sky.radiance) / facing);
-        let on_ground = white(&dome) + dome.sun_radiance * (facing * elevation.sin());
+        let facing = half_angle_rad.sin().powi(2);
+        dome.sun.radiance = hue / luminance(hue) * (f64::from(sky.sun * sky.radiance) / facing);
+        let on_ground = white(&dome) + dome.sun.radiance * (facing * elevation.sin());
         dome.ground = sky.ground.as_dvec3() * on_ground;
         dome.coefficients = dome.project(&directions);
         dome
@@ -134,11 +130,6 @@ impl Dome {
         if direction.y > 0.0 { self.above(direction) } else { self.ground }
     }
 
-    pub fn disc(&self) -> Disc {
-        let Dome { sun: toward, sun_half_angle_rad: half_angle_rad, sun_radiance: radiance, .. } = *self;
-        Disc { name: "sun of the sky", toward, half_angle_rad, radiance }
-    }
-
     /// Projection to at most [`MAX_BANDS`] bands, a list a channel.
     pub fn coefficients(&self, bands: usize) -> [&[f64]; 3] {
         self.coefficients.each_ref().map(|channel| &channel[..bands * bands])
@@ -146,7 +137,7 @@ impl Dome {
 
     /// The dome without the sun, above the horizon.
     fn above(&self, direction: DVec3) -> DVec3 {
-        let angle = direction.dot(self.sun).clamp(-1.0, 1.0).acos();
+        let angle = direction.dot(self.sun.toward).clamp(-1.0, 1.0).acos();
         let cosine = direction.y.max(1e-4);
         let value = |k: usize| self.zenith[k] * distribution(&self.perez[k], cosine, angle);
         let [luminance, x, y] = [self.scale * value(0), value(1), value(2)];

@@ -2,7 +2,7 @@
 
 use crate::asset::environment::RADIANCE_LIMIT;
 pub(super) use crate::asset::environment::{is_one, one};
-use crate::asset::short;
+use crate::text::short;
 use glam::Vec3;
 use serde::de::{Deserialize, Deserializer, Error};
 

@@ -102,14 +102,18 @@ pub fn volume_m3(positions: &[Vec3], triangles: &[[u32; 3]], centre: Vec3) -> f6
 }
 
 /// How often a closed surface winds around a point: the solid angle that its triangles fill as seen from there, over that
-/// of a whole view (Van Oosterom and Strackee, *The Solid Angle of a Plane Triangle*, 1983).
+/// of a whole view.
 pub fn winding(positions: &[Vec3], triangles: &[[u32; 3]], point: DVec3) -> f64 {
-    let half_angle = |triangle: &[u32; 3]| {
-        let [a, b, c] = triangle.map(|i| positions[i as usize].as_dvec3() - point);
-        let [x, y, z] = [a.length(), b.length(), c.length()];
-        a.dot(b.cross(c)).atan2(x * y * z + a.dot(b) * z + b.dot(c) * x + c.dot(a) * y)
-    };
-    triangles.iter().map(half_angle).sum::<f64>() / std::f64::consts::TAU
+    let of_triangle = |triangle: &[u32; 3]| solid_angle(triangle.map(|i| positions[i as usize].as_dvec3() - point));
+    triangles.iter().map(of_triangle).sum::<f64>() / (4.0 * std::f64::consts::PI)
+}
+
+/// Signed solid angle of a triangle seen from the origin, positive if the back is seen (Van Oosterom and Strackee, *The
+/// Solid Angle of a Plane Triangle*, 1983, equation 8).
+#[inline]
+pub(crate) fn solid_angle([a, b, c]: [DVec3; 3]) -> f64 {
+    let [x, y, z] = [a.length(), b.length(), c.length()];
+    2.0 * a.dot(b.cross(c)).atan2(x * y * z + a.dot(b) * z + b.dot(c) * x + c.dot(a) * y)
 }
 
 fn tetrahedron_m3(positions: &[Vec3], triangle: &[u32; 3], centre: Vec3) -> f64 {

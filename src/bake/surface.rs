@@ -1,13 +1,13 @@
 //! The surface of a mesh, which answers how near it is to a point and whether it encloses a point. It is a tree of
 //! neighbouring triangles, so that most of them are judged together.
 //!
-//! The winding number is the mesh's signed solid angle over 4 pi (for a triangle: Van Oosterom, Strackee 1983, equation
-//! 8). A node whose distance is large against its size counts as a dipole: the sum of its area normals at its middle.
-//! This follows Barill, Dickson, Schmidt, Levin, Jacobson, *Fast Winding Numbers for Soups and Clouds*, SIGGRAPH 2018,
-//! equation 11.
+//! The winding number is the mesh's signed solid angle over 4 pi. A node whose distance is large against its size counts
+//! as a dipole: the sum of its area normals at its middle. This follows Barill, Dickson, Schmidt, Levin, Jacobson, *Fast
+//! Winding Numbers for Soups and Clouds*, SIGGRAPH 2018, equation 11.
 
 use super::TRANSFER_OFFSET;
 use super::chunk::sort_spatially;
+use crate::asset::topology::solid_angle;
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 use std::f64::consts::PI;
@@ -151,15 +151,6 @@ pub fn depth_at_origin(triangles: &[[DVec3; 3]]) -> Option<f64> {
 
 fn bounds(triangles: &[[DVec3; 3]]) -> (DVec3, DVec3) {
     triangles.iter().flatten().fold((DVec3::MAX, DVec3::MIN), |(low, high), p| (low.min(*p), high.max(*p)))
-}
-
-/// Signed solid angle of a triangle seen from the origin. It is positive if the back is seen.
-fn solid_angle([a, b, c]: [DVec3; 3]) -> f64 {
-    let la = a.length();
-    let lb = b.length();
-    let lc = c.length();
-    let denominator = la * lb * lc + a.dot(b) * lc + b.dot(c) * la + c.dot(a) * lb;
-    2.0 * a.dot(b.cross(c)).atan2(denominator)
 }
 
 /// Most points that a thread takes at a time. Points near the surface take far longer than those outside its box.

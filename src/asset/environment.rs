@@ -380,12 +380,10 @@ fn key_zonal(bands: usize, sharpness: f64) -> Vec<f64> {
     let step = end / LOBE_INTERVALS as f64;
     let mut z = vec![0.0; bands];
     for i in 0..=LOBE_INTERVALS {
-        let weight = if i == 0 || i == LOBE_INTERVALS {
-            1.0
-        } else if i % 2 == 1 {
-            4.0
-        } else {
-            2.0
+        let weight = match i {
+            0 | LOBE_INTERVALS => 1.0,
+            _ if i % 2 == 1 => 4.0,
+            _ => 2.0,
         };
         let below = step * i as f64;
         let value = weight * step / 3.0 * (-sharpness * below).exp();

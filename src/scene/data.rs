@@ -506,10 +506,8 @@ impl Data {
     }
 }
 
-/// Holds data that was made in code to the rules of a scene file: it is written, and read again.
-///
-/// # Errors
-/// [`Error::Input`] in one line that starts with `what`.
+/// Holds data that was made in code to the rules of a scene file: it is written, and read again. A refusal starts with
+/// `what`.
 pub(super) fn check<T: Serialize + serde::de::DeserializeOwned>(what: impl std::fmt::Display, data: &T) -> Result<()> {
     let fail = |message: &str| Error::Input(format!("{what}: {}", plain(&flat(message))));
     let text = toml::to_string(data).map_err(|error| fail(&error.to_string()))?;

@@ -39,8 +39,7 @@ impl Apart {
         self.numbers.iter().max().map_or(1, |last| last + 1)
     }
 
-    /// # Errors
-    /// [`Error::Input`] in one line where there is no such piece.
+    /// The piece of that number, if there is one.
     pub fn piece(&self, piece: u32) -> Result<Mesh> {
         let Mesh { name, positions, normals, .. } = &self.whole;
         let numbered = self.whole.triangles.iter().zip(&self.numbers);

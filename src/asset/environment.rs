@@ -335,9 +335,9 @@ impl Environment {
     /// [`Environment::coefficients`] at strength 1, not turned.
     fn unturned(&self, bands: usize) -> [Vec<f64>; 3] {
         let mut sum = [const { Vec::new() }; 3].map(|_: Vec<f64>| vec![0.0; bands * bands]);
-        let mut add = |rgb: Vec3, shape: &[f64]| {
-            for (channel, amount) in sum.iter_mut().zip(rgb.as_dvec3().to_array()) {
-                channel.iter_mut().zip(shape).for_each(|(c, s)| *c += amount * s);
+        let mut add = |rgb: DVec3, parts: [&[f64]; 3]| {
+            for ((channel, part), amount) in sum.iter_mut().zip(parts).zip(rgb.to_array()) {
+                channel.iter_mut().zip(part).for_each(|(c, p)| *c += amount * p);
             }
         };
         let one = |amount: f64| {
@@ -346,28 +346,22 @@ impl Environment {
             shape
         };
         if let Some(rgb) = self.source.uniform {
-            add(rgb, &one(1.0));
+            add(rgb.as_dvec3(), [&one(1.0); 3]);
         }
         if let Some(g) = &self.source.gradient {
-            add(g.radiance, &one(f64::from(g.base)));
-            add(g.radiance * g.rise, &lobe::clamped_cosine(bands, DVec3::Y));
+            add(g.radiance.as_dvec3(), [&one(f64::from(g.base)); 3]);
+            add((g.radiance * g.rise).as_dvec3(), [&lobe::clamped_cosine(bands, DVec3::Y); 3]);
         }
         if let Some(k) = &self.source.key {
-            add(
-                k.radiance,
-                &lobe::zonal(bands, &key_zonal(bands, f64::from(k.sharpness)), k.toward.as_dvec3().normalize()),
-            );
+            let zonal = key_zonal(bands, f64::from(k.sharpness));
+            let shape = lobe::zonal(bands, &zonal, k.toward.as_dvec3().normalize());
+            add(k.radiance.as_dvec3(), [&shape; 3]);
         }
-        let mut mix = |parts: [&[f64]; 3], scale: f64| {
-            for (channel, part) in sum.iter_mut().zip(parts) {
-                channel.iter_mut().zip(part).for_each(|(c, p)| *c += scale * p);
-            }
-        };
         if let Some(dome) = &self.dome {
-            mix(dome.coefficients(bands), 1.0);
+            add(DVec3::ONE, dome.coefficients(bands));
         }
         if let (Some(picture), Some(image)) = (&self.picture, &self.source.image) {
-            mix(picture.coefficients(bands), f64::from(image.scale));
+            add(DVec3::splat(f64::from(image.scale)), picture.coefficients(bands));
         }
         sum
     }

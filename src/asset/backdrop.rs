@@ -27,7 +27,7 @@ impl Backdrop {
         if environment.is_uniform() {
             return None;
         }
-        let picture = environment.picture();
+        let picture = environment.picture.as_deref();
         let [wide, high] = picture.map_or(SIZE, |picture| picture.size());
         // Texels of the picture along one of the map.
         let step = wide.div_ceil(WIDEST);

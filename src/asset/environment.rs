@@ -145,7 +145,7 @@ impl EnvironmentData {
     /// [`EnvironmentData::within`] for the mean of a picture.
     fn check_picture(&self, picture: Option<&Arc<Equirect>>) -> Result<()> {
         let Some((picture, image)) = picture.zip(self.image.as_ref()) else { return Ok(()) };
-        let mean = picture.coefficients(1).iter().map(|c| c[0]).fold(0.0, f64::max) / (4.0 * PI).sqrt();
+        let mean = picture.coefficients.iter().map(|c| c[0]).fold(0.0, f64::max) / (4.0 * PI).sqrt();
         self.within("image", mean * f64::from(image.scale))
     }
 
@@ -213,7 +213,7 @@ pub struct EnvironmentImage {
 #[derive(Clone, Debug)]
 pub struct Environment {
     source: EnvironmentData,
-    picture: Option<Arc<Equirect>>,
+    pub(super) picture: Option<Arc<Equirect>>,
     dome: Option<Arc<Dome>>,
 }
 
@@ -276,11 +276,6 @@ impl Environment {
         self.is_none() || gradient.is_none() && key.is_none() && self.dome.is_none() && self.picture.is_none()
     }
 
-    /// The picture, where there is one.
-    pub(super) fn picture(&self) -> Option<&Equirect> {
-        self.picture.as_deref()
-    }
-
     /// Factor on the picture's radiance.
     pub(super) fn picture_scale(&self) -> f32 {
         self.source.strength * self.source.image.as_ref().map_or(1.0, |image| image.scale)
@@ -335,6 +330,7 @@ impl Environment {
     /// [`Environment::coefficients`] at strength 1, not turned.
     fn unturned(&self, bands: usize) -> [Vec<f64>; 3] {
         let mut sum = [const { Vec::new() }; 3].map(|_: Vec<f64>| vec![0.0; bands * bands]);
+        // Parts may have more bands, which are left out.
         let mut add = |rgb: DVec3, parts: [&[f64]; 3]| {
             for ((channel, part), amount) in sum.iter_mut().zip(parts).zip(rgb.to_array()) {
                 channel.iter_mut().zip(part).for_each(|(c, p)| *c += amount * p);
@@ -358,10 +354,10 @@ impl Environment {
             add(k.radiance.as_dvec3(), [&shape; 3]);
         }
         if let Some(dome) = &self.dome {
-            add(DVec3::ONE, dome.coefficients(bands));
+            add(DVec3::ONE, dome.coefficients.each_ref().map(Vec::as_slice));
         }
         if let (Some(picture), Some(image)) = (&self.picture, &self.source.image) {
-            add(DVec3::splat(f64::from(image.scale)), picture.coefficients(bands));
+            add(DVec3::splat(f64::from(image.scale)), picture.coefficients.each_ref().map(Vec::as_slice));
         }
         sum
     }

@@ -40,7 +40,9 @@ pub struct Equirect {
     pub lights: Vec<Disc>,
     /// Of these, by texel, row by row, the radiance that was theirs.
     taken: Vec<(usize, [f32; 3])>,
-    coefficients: [Vec<f64>; 3],
+    /// Its projection to [`MAX_BANDS`] bands, one list per channel. It is exact for a radiance that is constant over each
+    /// texel: texels are integrated, not sampled at their centres.
+    pub coefficients: [Vec<f64>; 3],
 }
 
 /// Unit direction of a place on a picture, both from 0 to 1.
@@ -121,12 +123,6 @@ impl Equirect {
         let x = (column as usize).min(self.width - 1);
         let y = (row as usize).min(self.height - 1);
         DVec3::from_array(self.texels[y * self.width + x].map(f64::from))
-    }
-
-    /// Its projection to at most [`MAX_BANDS`] bands, one list per channel. It is exact for a radiance that is constant
-    /// over each texel: texels are integrated, not sampled at their centres.
-    pub fn coefficients(&self, bands: usize) -> [&[f64]; 3] {
-        self.coefficients.each_ref().map(|channel| &channel[..bands * bands])
     }
 
     /// With the polar axis along z, SH are A_lm(theta) times cos(m phi) or sin(|m| phi), so the integral over a texel

@@ -81,7 +81,8 @@ pub struct Dome {
     scale: f64,
     /// Linear RGB radiance below the horizon.
     ground: DVec3,
-    coefficients: [Vec<f64>; 3],
+    /// Projection to [`MAX_BANDS`] bands, a list a channel.
+    pub coefficients: [Vec<f64>; 3],
 }
 
 impl Dome {
@@ -128,11 +129,6 @@ impl Dome {
     /// Linear RGB radiance from the unit vector `direction`, without the sun's disc.
     pub fn radiance(&self, direction: DVec3) -> DVec3 {
         if direction.y > 0.0 { self.above(direction) } else { self.ground }
-    }
-
-    /// Projection to at most [`MAX_BANDS`] bands, a list a channel.
-    pub fn coefficients(&self, bands: usize) -> [&[f64]; 3] {
-        self.coefficients.each_ref().map(|channel| &channel[..bands * bands])
     }
 
     /// The dome without the sun, above the horizon.

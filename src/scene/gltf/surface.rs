@@ -99,11 +99,13 @@ impl Surface {
         let json = material.map_or(&default, |index| &document.root.materials[index]);
         let place = material.map_or("the default material".to_owned(), |index| format!("materials[{index}]"));
         let pbr = &json.pbr_metallic_roughness;
+        let extensions = json.extensions.as_ref();
+        let alpha_blend = matches!(json.alpha_mode, Checked::Valid(AlphaMode::Blend));
         let [r, g, b, mut alpha] = pbr.base_color_factor.0;
         let mut albedo = Vec3::new(r, g, b);
         let mut attributes = Attributes::default();
         if let Some(colors) = shape.attribute(document, &Semantic::Colors(0), &[3, 4], 4)? {
-            if matches!(json.alpha_mode, Checked::Valid(AlphaMode::Blend)) {
+            if alpha_blend {
                 // An entity has one opacity.
                 alpha *= colors.chunks_exact(4).map(|c| c[3]).sum::<f32>() / (colors.len() / 4) as f32;
             }
@@ -119,15 +121,18 @@ impl Surface {
         }
         let metal = textures.applied(pbr.metallic_roughness_texture.as_ref(), shape, notes)?;
         let share_of_metal = metal.as_ref().map_or(1.0, |applied| applied.texels.mean_bytes()[2]);
-        let extensions = json.extensions.as_ref();
-        let passes = extensions.and_then(|e| e.transmission.as_ref()).and_then(|t| t.transmission_texture.as_ref());
+        let transmission = extensions.and_then(|e| e.transmission.as_ref());
+        let passes = transmission.and_then(|t| t.transmission_texture.as_ref());
         let passes = textures.applied(passes, shape, notes)?.map_or(1.0, |applied| applied.texels.mean_bytes()[0]);
-        let (opacity, albedo) = passing(json, alpha, passes, share_of_metal, albedo.min(Vec3::ONE));
+        let passes = passes * transmission.map_or(0.0, |t| t.transmission_factor.0.clamp(0.0, 1.0));
+        // A metal lets nothing through.
+        let passes = passes * (1.0 - share_of_metal * pbr.metallic_factor.0.clamp(0.0, 1.0));
+        let (kept, albedo) = kept_back(passes, albedo.min(Vec3::ONE));
+        let opacity = if alpha_blend { alpha.clamp(0.0, 1.0) * kept } else { kept };
         let base = textures.applied(pbr.base_color_texture.as_ref(), shape, notes)?;
         // The factor's alpha is another factor of what is compared.
         let alpha_cutoff = matches!(json.alpha_mode, Checked::Valid(AlphaMode::Mask))
             .then(|| (json.alpha_cutoff.map_or(0.5, |cutoff| cutoff.0) / alpha.max(1e-6)).clamp(0.0, 1.0));
-        let alpha_blend = matches!(json.alpha_mode, Checked::Valid(AlphaMode::Blend));
         let shows_backs = opacity < 1.0 || base.is_some() && (alpha_blend || alpha_cutoff.is_some());
         let has_backs = json.double_sided && shows_backs;
         let paint = (base.is_some() || attributes.tints.is_some()).then(|| Paint {
@@ -141,7 +146,7 @@ impl Surface {
             },
         });
         attributes.uvs = base.and_then(|base| base.uvs);
-        let is_unlit = json.extensions.as_ref().is_some_and(|e| e.unlit.is_some());
+        let is_unlit = extensions.is_some_and(|e| e.unlit.is_some());
         let normal_scale = json.normal_texture.as_ref().map(|normal| normal.scale).filter(|scale| *scale != 1.0);
         if normal_scale.is_some_and(|scale| !(scale.abs() <= SLOPE_LIMIT)) {
             return Err(document.fail(place, "the scale of its normals is not within -100 to 100"));
@@ -195,19 +200,10 @@ fn info(normal: &NormalTexture) -> serde_json::Result<Info> {
 }
 
 /// The share of light that a material keeps back, and its base colour less what passes in place of being reflected.
-/// `passes` and `metal` are means of textures.
-fn passing(json: &Material, alpha: f32, passes: f32, metal: f32, albedo: Vec3) -> (f32, Vec3) {
-    let alpha = match json.alpha_mode {
-        Checked::Valid(AlphaMode::Blend) => alpha.clamp(0.0, 1.0),
-        _ => 1.0,
-    };
-    let transmission = json.extensions.as_ref().and_then(|e| e.transmission.as_ref());
-    let transmission = passes * transmission.map_or(0.0, |t| t.transmission_factor.0.clamp(0.0, 1.0));
-    // A metal lets nothing through.
-    let passes = transmission * (1.0 - metal * json.pbr_metallic_roughness.metallic_factor.0.clamp(0.0, 1.0));
+fn kept_back(passes: f32, albedo: Vec3) -> (f32, Vec3) {
     let kept = 1.0 - passes * albedo.dot(Vec3::new(0.2126, 0.7152, 0.0722));
     // An entity's opacity counts in what it reflects too.
-    (alpha * kept, if kept > 0.0 { ((1.0 - passes) / kept * albedo).min(Vec3::ONE) } else { Vec3::ZERO })
+    (kept, if kept > 0.0 { ((1.0 - passes) / kept * albedo).min(Vec3::ONE) } else { Vec3::ZERO })
 }
 
 /// Metallic-roughness reflection; a texture that is no map counts by its mean.

@@ -82,7 +82,7 @@ pub struct Scene {
 pub(crate) const MOST_SCREENS: usize = 8;
 
 /// The properties of an entity that do not depend on time.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Entity {
     /// Its name, or `entity N` counted from 0.
     pub name: String,

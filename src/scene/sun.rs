@@ -5,10 +5,10 @@
 //! changes by 1e-4 radians. The distance is the same for every scene, so that no edit of anything else moves a sun by
 //! the last bit.
 
-use super::{Entity, MapIndices, Placement, Scene};
+use super::{Entity, Placement, Scene};
 use crate::asset::disc::Disc;
 use crate::asset::generate::sphere;
-use glam::{DVec3, Quat, Vec3};
+use glam::{DVec3, Quat};
 use std::sync::Arc;
 
 /// Distance of suns from the origin, metres. Directions from f32 coordinates are as exact as from near lights, 1e-7.
@@ -41,17 +41,10 @@ impl Scene {
             self.entities.push(Entity {
                 name: name.into(),
                 mesh,
-                albedo: Vec3::ZERO,
-                texture: None,
-                gloss: None,
-                maps: MapIndices::default(),
                 opacity: 1.0,
-                transparent: false,
                 emission: (radiance / share).as_vec3(),
-                spot: None,
                 emits: radiance != DVec3::ZERO,
-                occludes: false,
-                receives: false,
+                ..Entity::default()
             });
             self.suns.push(Placement {
                 position: toward.as_vec3() * DISTANCE_M,

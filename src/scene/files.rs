@@ -3,20 +3,15 @@
 use super::{Data, FILE_LIMIT_BYTES, gltf, single};
 use crate::asset::{embedded, read_file};
 use serde::Deserialize;
+use serde_json::{Map, Value};
 use std::path::{Path, PathBuf};
 
 /// The file names in a glTF file.
 #[derive(Default, Deserialize)]
 #[serde(default)]
 struct GltfFile {
-    buffers: Vec<Linked>,
-    images: Vec<Linked>,
-}
-
-#[derive(Default, Deserialize)]
-#[serde(default)]
-struct Linked {
-    uri: Option<String>,
+    buffers: Vec<Map<String, Value>>,
+    images: Vec<Map<String, Value>>,
 }
 
 /// A scene's file (or one that is taken as a scene), the files that it names, and those that they name.
@@ -43,9 +38,9 @@ pub fn of_mesh(path: &Path) -> Vec<PathBuf> {
         let (json, _) = gltf::split(&bytes).unwrap_or_default();
         let file: GltfFile = serde_json::from_slice(json).unwrap_or_default();
         let folder = path.parent().unwrap_or(Path::new(""));
-        let uris = file.buffers.into_iter().chain(file.images).filter_map(|linked| linked.uri);
+        let uris = file.buffers.iter().chain(&file.images).filter_map(|linked| linked.get("uri")?.as_str());
         let names = uris.filter(|uri| !uri.starts_with("data:"));
-        all.extend(names.map(|uri| folder.join(&*percent_encoding::percent_decode_str(&uri).decode_utf8_lossy())));
+        all.extend(names.map(|uri| folder.join(&*percent_encoding::percent_decode_str(uri).decode_utf8_lossy())));
     }
     all
 }

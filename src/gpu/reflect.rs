@@ -68,6 +68,8 @@ pub(super) struct Reader<'m> {
     module: &'m Module,
     definitions: HashMap<u32, &'m Instruction>,
     names: HashMap<u32, &'m str>,
+    /// What follows a decoration, by the id that carries it and the member of it, if it is a member's.
+    decorations: HashMap<(u32, Option<u32>, Decoration), Option<&'m Operand>>,
 }
 
 fn id(operand: &Operand) -> u32 {
@@ -90,35 +92,31 @@ impl<'m> Reader<'m> {
             (Op::Name, [target, Operand::LiteralString(name)]) => Some((id(target), name.as_str())),
             _ => None,
         };
+        let decorated = |instruction: &'m Instruction| match (instruction.class.opcode, &instruction.operands[..]) {
+            (Op::Decorate, [on, Operand::Decoration(kind), rest @ ..]) => Some(((id(on), None, *kind), rest.first())),
+            (Op::MemberDecorate, [on, Operand::LiteralBit32(member), Operand::Decoration(kind), rest @ ..]) => {
+                Some(((id(on), Some(*member), *kind), rest.first()))
+            }
+            _ => None,
+        };
         let names = module.debug_names.iter().filter_map(named).collect();
+        let decorations = module.annotations.iter().filter_map(decorated).collect();
         let definitions =
             module.types_global_values.iter().filter_map(|i| i.result_id.map(|result| (result, i))).collect();
-        Reader { module, definitions, names }
+        Reader { module, definitions, names, decorations }
     }
 
     fn name(&self, target: u32) -> &'m str {
         self.names.get(&target).copied().unwrap_or("")
     }
 
-    /// Operands after the decoration's name, if `target` carries it.
-    fn decoration(&self, target: u32, wanted: Decoration) -> Option<&'m [Operand]> {
-        self.module.annotations.iter().find_map(|i| match (i.class.opcode, &i.operands[..]) {
-            (Op::Decorate, [on, Operand::Decoration(found), rest @ ..]) if id(on) == target && *found == wanted => {
-                Some(rest)
-            }
-            _ => None,
-        })
+    /// The number of a decoration that `target` carries, or a member of it.
+    fn decoration(&self, target: u32, member: Option<u32>, wanted: Decoration) -> Option<u32> {
+        self.decorations.get(&(target, member, wanted)).map(|number| literal(*number))
     }
 
-    fn member_decoration(&self, target: u32, member: u32, wanted: Decoration) -> Option<&'m [Operand]> {
-        self.module.annotations.iter().find_map(|i| match (i.class.opcode, &i.operands[..]) {
-            (Op::MemberDecorate, [on, Operand::LiteralBit32(at), Operand::Decoration(found), rest @ ..])
-                if id(on) == target && *at == member && *found == wanted =>
-            {
-                Some(rest)
-            }
-            _ => None,
-        })
+    fn is_read_only(&self, target: u32, member: Option<u32>) -> bool {
+        self.decorations.contains_key(&(target, member, Decoration::NonWritable))
     }
 
     fn reflect(&self) -> Result<Reflection> {
@@ -129,10 +127,8 @@ impl<'m> Reader<'m> {
                 self.variable(result, instruction, &mut out)?;
             }
             let is_size = instruction.class.opcode == Op::SpecConstantComposite
-                && matches!(
-                    self.decoration(result, Decoration::BuiltIn),
-                    Some([Operand::BuiltIn(BuiltIn::WorkgroupSize)])
-                );
+                && self.decorations.get(&(result, None, Decoration::BuiltIn))
+                    == Some(&Some(&Operand::BuiltIn(BuiltIn::WorkgroupSize)));
             if is_size {
                 return Err(Error::Failed("the local size must be literal, not a specialisation constant".into()));
             }
@@ -155,8 +151,7 @@ impl<'m> Reader<'m> {
             StorageClass::PushConstant => out.push_bytes = self.size_bytes(target),
             StorageClass::Workgroup => out.shared_bytes += self.size_bytes(target),
             StorageClass::Input => {
-                if let Some(location) = self.decoration(result, Decoration::Location) {
-                    let location = literal(location.first());
+                if let Some(location) = self.decoration(result, None, Decoration::Location) {
                     out.inputs.push(VertexInput { location, components: self.components(target) });
                 }
             }
@@ -171,20 +166,18 @@ impl<'m> Reader<'m> {
     fn binding(&self, variable: u32, target: u32, class: StorageClass) -> Result<Binding> {
         let definition = self.definitions[&target];
         let name = self.variable_name(variable);
-        let set = self.decoration(variable, Decoration::DescriptorSet).map_or(0, |o| literal(o.first()));
+        let set = self.decoration(variable, None, Decoration::DescriptorSet).unwrap_or(0);
         if set != 0 {
             return Err(Error::Failed(format!("{name} is in descriptor set {set}; all bindings are in set 0")));
         }
         let index = self
-            .decoration(variable, Decoration::Binding)
-            .map(|o| literal(o.first()))
+            .decoration(variable, None, Decoration::Binding)
             .ok_or_else(|| Error::Failed(format!("{name} has no binding number")))?;
         let (kind, writes) = match (class, definition.class.opcode) {
             (StorageClass::StorageBuffer, Op::TypeStruct) => {
                 let members = definition.operands.len() as u32;
-                let read_only = self.decoration(variable, Decoration::NonWritable).is_some()
-                    || (0..members)
-                        .all(|member| self.member_decoration(target, member, Decoration::NonWritable).is_some());
+                let read_only = self.is_read_only(variable, None)
+                    || (0..members).all(|member| self.is_read_only(target, Some(member)));
                 (vk::DescriptorType::STORAGE_BUFFER, !read_only)
             }
             (StorageClass::Uniform, Op::TypeStruct) => (vk::DescriptorType::UNIFORM_BUFFER, false),
@@ -233,13 +226,13 @@ impl<'m> Reader<'m> {
             Op::TypeVector | Op::TypeMatrix => literal(operands.get(1)) * self.size_bytes(id(&operands[0])),
             Op::TypeArray => {
                 let length = literal(self.definitions[&id(&operands[1])].operands.first());
-                let stride = self.decoration(of, Decoration::ArrayStride).map(|o| literal(o.first()));
+                let stride = self.decoration(of, None, Decoration::ArrayStride);
                 length * stride.unwrap_or_else(|| self.size_bytes(id(&operands[0])))
             }
             Op::TypeStruct => (0..operands.len() as u32)
                 .map(|member| {
-                    let offset = self.member_decoration(of, member, Decoration::Offset);
-                    offset.map_or(0, |o| literal(o.first())) + self.size_bytes(id(&operands[member as usize]))
+                    let offset = self.decoration(of, Some(member), Decoration::Offset);
+                    offset.unwrap_or(0) + self.size_bytes(id(&operands[member as usize]))
                 })
                 .max()
                 .unwrap_or(0),

@@ -144,12 +144,9 @@ pub(super) fn describe(instance: &ash::Instance, index: usize, physical: vk::Phy
     } else {
         None
     };
-    let text = |chars: &[std::ffi::c_char]| {
-        let bytes: Vec<u8> = chars.iter().map(|&c| c.cast_unsigned()).collect();
-        CStr::from_bytes_until_nul(&bytes).map(|s| s.to_string_lossy().into_owned()).unwrap_or_default()
-    };
-    let driver_name = text(&driver.driver_name);
-    let driver_info = text(&driver.driver_info);
+    let text = |found: &CStr| found.to_string_lossy().into_owned();
+    let driver_name = driver.driver_name_as_c_str().map(text).unwrap_or_default();
+    let driver_info = driver.driver_info_as_c_str().map(text).unwrap_or_default();
     let driver = match (driver_name.is_empty(), driver_info.is_empty()) {
         (true, _) => format!("driver version {}", properties.driver_version),
         (false, true) => driver_name,
@@ -157,7 +154,7 @@ pub(super) fn describe(instance: &ash::Instance, index: usize, physical: vk::Phy
     };
     Candidate {
         index,
-        name: text(&properties.device_name),
+        name: properties.device_name_as_c_str().map(text).unwrap_or_default(),
         kind: properties.device_type,
         api: version_text(properties.api_version),
         driver,

@@ -73,15 +73,9 @@ pub(super) unsafe extern "system" fn on_message(
 ) -> vk::Bool32 {
     // SAFETY: see the function's contract.
     let (data, messages) = unsafe { (&*data, &*user.cast::<Messages>()) };
-    let text = |pointer: *const std::ffi::c_char| {
-        if pointer.is_null() {
-            return String::new();
-        }
-        // SAFETY: a non-null string of the callback data is NUL-terminated and outlives the call.
-        unsafe { CStr::from_ptr(pointer) }.to_string_lossy().into_owned()
-    };
-    let id = text(data.p_message_id_name);
-    let body = text(data.p_message);
+    // SAFETY: a non-null string of the callback data is NUL-terminated and outlives the call.
+    let texts = unsafe { [data.message_id_name_as_c_str(), data.message_as_c_str()] };
+    let [id, body] = texts.map(|text| text.unwrap_or_default().to_string_lossy());
     if id == "Loader Message" {
         return vk::FALSE;
     }

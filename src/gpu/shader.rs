@@ -76,8 +76,7 @@ impl Shader {
         let path = cache_dir.map(|folder| folder.join("spirv").join(format!("{key}.spv")));
         let file = path.as_ref().and_then(|path| crate::files::read(path).ok()).unwrap_or_default();
         let cached = unsealed(key, &file).filter(|bytes| bytes.len() % 4 == 0);
-        let word = |bytes: &[u8]| u32::from_ne_bytes(bytes.try_into().expect("four bytes"));
-        let cached = cached.map(|bytes| bytes.chunks_exact(4).map(word).collect());
+        let cached = cached.map(|bytes| bytes.chunks_exact(4).map(bytemuck::pod_read_unaligned).collect());
         let shader = |spirv: Vec<u32>| -> Result<Self> {
             let reflection = Reflection::new(&spirv).map_err(|error| error.context(source.name))?;
             Ok(Shader { name: source.name.to_owned(), stage: source.stage, spirv, reflection })
@@ -152,9 +151,9 @@ fn key(source: &ShaderSource<'_>, includes: &BTreeMap<String, String>) -> String
 }
 
 fn compile(source: &ShaderSource<'_>, includes: &BTreeMap<String, String>) -> Result<Vec<u32>> {
-    let failed = |what: String| Error::Failed(format!("{}: {what}", source.name));
-    let compiler = shaderc::Compiler::new().map_err(|error| failed(format!("no shader compiler: {error}")))?;
-    let mut options = shaderc::CompileOptions::new().map_err(|error| failed(format!("no shader compiler: {error}")))?;
+    let missing = |error: shaderc::Error| Error::Failed(format!("{}: no shader compiler: {error}", source.name));
+    let compiler = shaderc::Compiler::new().map_err(missing)?;
+    let mut options = shaderc::CompileOptions::new().map_err(missing)?;
     options.set_target_env(shaderc::TargetEnv::Vulkan, shaderc::EnvVersion::Vulkan1_3 as u32);
     // 1.5: in 1.6 the local size becomes an id (ExecutionModeId), which the reader in rspirv 0.13 refuses.
     options.set_target_spirv(shaderc::SpirvVersion::V1_5);

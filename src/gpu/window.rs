@@ -51,7 +51,7 @@ impl Device {
 
 /// A window's Vulkan surface. It keeps the window alive.
 struct WindowSurface {
-    device: Arc<Device>,
+    _device: Arc<Device>,
     loader: khr::surface::Instance,
     handle: vk::SurfaceKHR,
     /// Last: the window outlives its surface.
@@ -71,7 +71,7 @@ impl WindowSurface {
         // the instance, which the device keeps alive.
         let handle = unsafe { ash_window::create_surface(entry, instance, display, handle, None) }
             .checked("vkCreateSurfaceKHR", "window")?;
-        let surface = WindowSurface { device: device.clone(), loader, handle, _window: Box::new(window.clone()) };
+        let surface = WindowSurface { _device: device.clone(), loader, handle, _window: Box::new(window.clone()) };
         // SAFETY: physical device and surface are alive.
         let supported = unsafe {
             surface.loader.get_physical_device_surface_support(device.physical, device.queue_family, surface.handle)
@@ -91,7 +91,6 @@ impl Drop for WindowSurface {
     fn drop(&mut self) {
         // SAFETY: its swapchain is gone (field order of `Window`).
         unsafe { self.loader.destroy_surface(self.handle, None) };
-        let _ = &self.device;
     }
 }
 

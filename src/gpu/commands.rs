@@ -18,6 +18,7 @@ use bytemuck::Pod;
 use std::ffi::CString;
 use std::ops::Range;
 use std::sync::Arc;
+use std::sync::atomic::Ordering;
 
 /// The first level of an image beside a buffer with tightly packed rows.
 pub(super) fn packed(image: &Image) -> vk::BufferImageCopy {
@@ -98,8 +99,7 @@ impl<'r> Commands<'r> {
 
     /// Has this pass's [`super::Timing`] tell a number that it has left in a word of a buffer, at a byte offset.
     pub fn count(&mut self, buffer: &'r Buffer, offset_bytes: u64) -> Result<()> {
-        let pass = self.pass_name();
-        self.tracker.use_range(buffer.id, &buffer.name, offset_bytes..offset_bytes + 4, Access::TransferRead, &pass);
+        self.uses_range(buffer, offset_bytes..offset_bytes + 4, Access::TransferRead);
         let (counts, at) = self.recording.next_count()?;
         let regions = [vk::BufferCopy { src_offset: offset_bytes, dst_offset: at, size: 4 }];
         let (handle, commands) = self.raw();
@@ -137,8 +137,13 @@ impl<'r> Commands<'r> {
         unsafe { handle.cmd_pipeline_barrier2(buffer, &info) };
     }
 
-    pub(super) fn pass_name(&self) -> String {
-        self.recording.passes.last().unwrap_or(&self.recording.name).clone()
+    /// Notes that the current pass uses a byte range of a buffer.
+    pub(super) fn uses_range(&mut self, buffer: &Buffer, range: Range<u64>, access: Access) {
+        self.tracker.use_range(buffer.id, &buffer.name, range, access, self.recording.pass_name());
+    }
+
+    pub(super) fn uses_image(&mut self, image: &Image, access: Access) {
+        self.tracker.use_image(image.id, &image.name, access, self.recording.pass_name());
     }
 
     /// Memory barrier: all `from` accesses before it are complete and visible to all `to` accesses after it, for every
@@ -163,25 +168,36 @@ impl<'r> Commands<'r> {
         if from.is_some() && self.skip_barrier() {
             return;
         }
-        let (stage, mask, layout) = match from {
+        let (memory, layout) = match from {
             Some(from) => {
                 self.tracker.barrier(from, to, Some(image.id));
-                (from.stage(), from.mask(), from.layout())
+                (between(from, to), from.layout())
             }
             None => {
                 self.tracker.discard(image.id, to);
-                (to.stage(), vk::AccessFlags2::NONE, vk::ImageLayout::UNDEFINED)
+                (between(to, to).src_access_mask(vk::AccessFlags2::NONE), vk::ImageLayout::UNDEFINED)
             }
         };
+        self.turn(image, image.whole(), [layout, to.layout()], memory);
+    }
+
+    /// A barrier for a part of an image that goes from one layout to another.
+    fn turn(
+        &self,
+        image: &'r Image,
+        part: vk::ImageSubresourceRange,
+        [from, to]: [vk::ImageLayout; 2],
+        memory: vk::MemoryBarrier2<'_>,
+    ) {
         let barriers = [vk::ImageMemoryBarrier2::default()
             .image(image.raw())
-            .subresource_range(image.whole())
-            .old_layout(layout)
-            .new_layout(to.layout())
-            .src_stage_mask(stage)
-            .src_access_mask(mask)
-            .dst_stage_mask(to.stage())
-            .dst_access_mask(to.mask())];
+            .subresource_range(part)
+            .old_layout(from)
+            .new_layout(to)
+            .src_stage_mask(memory.src_stage_mask)
+            .src_access_mask(memory.src_access_mask)
+            .dst_stage_mask(memory.dst_stage_mask)
+            .dst_access_mask(memory.dst_access_mask)];
         let info = vk::DependencyInfo::default().image_memory_barriers(&barriers);
         let (handle, buffer) = self.raw();
         // SAFETY: the command buffer is recording and outside a render pass; the image is borrowed until it has run.
@@ -191,7 +207,7 @@ impl<'r> Commands<'r> {
     /// Counts a barrier and returns whether a test asked to omit it ([`Device::omit_barrier`]).
     fn skip_barrier(&mut self) -> bool {
         self.barrier_count += 1;
-        self.barrier_count - 1 == self.recording.device.omitted_barrier()
+        self.barrier_count - 1 == self.recording.device.omitted_barrier.load(Ordering::Relaxed)
     }
 
     /// Runs a compute pipeline over `elements` invocations in x, y and z; `resources` stand at their binding numbers.
@@ -202,7 +218,8 @@ impl<'r> Commands<'r> {
         push: &P,
         elements: [u32; 3],
     ) -> Result<()> {
-        let groups = [0, 1, 2].map(|axis| elements[axis].div_ceil(pipeline.local_size[axis]));
+        let ComputePipeline { pipeline, local_size } = pipeline;
+        let groups = [0, 1, 2].map(|axis| elements[axis].div_ceil(local_size[axis]));
         let most = self.recording.device.limits.max_compute_work_group_count;
         if (0..3).any(|axis| groups[axis] > most[axis]) {
             return Err(Error::Input(format!("{}: {groups:?} workgroups, the device takes {most:?}", pipeline.name)));
@@ -210,8 +227,8 @@ impl<'r> Commands<'r> {
         if groups.contains(&0) {
             return Ok(());
         }
-        self.bind(pipeline.layout(), &pipeline.name, vk::PipelineBindPoint::COMPUTE, resources)?;
-        self.push(pipeline.layout(), &pipeline.name, push);
+        self.bind(pipeline, vk::PipelineBindPoint::COMPUTE, resources)?;
+        self.push(pipeline, push);
         let (handle, buffer) = self.raw();
         // SAFETY: pipeline and resources are borrowed until the commands have run; limits were checked above.
         unsafe {
@@ -224,16 +241,15 @@ impl<'r> Commands<'r> {
     /// Runs as many workgroups as three words at a byte offset of a buffer say.
     pub fn dispatch_indirect<P: Pod>(
         &mut self,
-        pipeline: &'r ComputePipeline,
+        ComputePipeline { pipeline, .. }: &'r ComputePipeline,
         resources: &[Bind<'r>],
         push: &P,
         groups: (&'r Buffer, u64),
     ) -> Result<()> {
-        self.bind(pipeline.layout(), &pipeline.name, vk::PipelineBindPoint::COMPUTE, resources)?;
-        self.push(pipeline.layout(), &pipeline.name, push);
+        self.bind(pipeline, vk::PipelineBindPoint::COMPUTE, resources)?;
+        self.push(pipeline, push);
         let (buffer, offset) = groups;
-        let pass = self.pass_name();
-        self.tracker.use_range(buffer.id, &buffer.name, offset..offset + 12, Access::Indirect, &pass);
+        self.uses_range(buffer, offset..offset + 12, Access::Indirect);
         let (handle, commands) = self.raw();
         // SAFETY: pipeline, resources and the buffer are borrowed until the commands have run; the words lie within it.
         unsafe {
@@ -249,9 +265,8 @@ impl<'r> Commands<'r> {
         assert!(range.end <= from.size_bytes, "{}: copy of {range:?} of {}", from.name, from.size_bytes);
         let target = offset_bytes..offset_bytes + size;
         assert!(target.end <= to.size_bytes, "{}: copy into {target:?} of {}", to.name, to.size_bytes);
-        let pass = self.pass_name();
-        self.tracker.use_range(from.id, &from.name, range.clone(), Access::TransferRead, &pass);
-        self.copied_into(to, target, &pass);
+        self.uses_range(from, range.clone(), Access::TransferRead);
+        self.copied_into(to, target);
         let regions = [vk::BufferCopy { src_offset: range.start, dst_offset: offset_bytes, size }];
         let (handle, buffer) = self.raw();
         // SAFETY: both ranges are in bounds and both buffers are borrowed until the commands have run.
@@ -259,8 +274,8 @@ impl<'r> Commands<'r> {
     }
 
     /// Notes a copy into `to`. The host reads a readback buffer after the commands have run.
-    fn copied_into(&mut self, to: &'r Buffer, range: Range<u64>, pass: &str) {
-        self.tracker.use_range(to.id, &to.name, range.clone(), Access::TransferWrite, pass);
+    fn copied_into(&mut self, to: &'r Buffer, range: Range<u64>) {
+        self.uses_range(to, range.clone(), Access::TransferWrite);
         if to.kind == BufferKind::Readback {
             self.read_back.push((to, range));
         }
@@ -273,11 +288,10 @@ impl<'r> Commands<'r> {
 
     /// Copies the first rows of a single-sampled image, tightly packed, to a range of a buffer of their size.
     pub fn copy_rows(&mut self, from: &'r Image, rows: u32, to: &'r Buffer, range: Range<u64>) {
-        let pass = self.pass_name();
         let mut region = packed(from).buffer_offset(range.start);
         region.image_extent.height = rows;
-        self.tracker.use_image(from.id, &from.name, Access::TransferRead, &pass);
-        self.copied_into(to, range, &pass);
+        self.uses_image(from, Access::TransferRead);
+        self.copied_into(to, range);
         let layout = Access::TransferRead.layout();
         let (handle, buffer) = self.raw();
         // SAFETY: both are borrowed until the commands have run; the layout is that of a transfer read (tracked).
@@ -291,9 +305,8 @@ impl<'r> Commands<'r> {
 
     /// Copies parts of a buffer, which lie within it, into parts of an image.
     pub(super) fn copy_regions(&mut self, from: &'r Buffer, to: &'r Image, regions: &[vk::BufferImageCopy]) {
-        let pass = self.pass_name();
-        self.tracker.use_range(from.id, &from.name, from.all(), Access::TransferRead, &pass);
-        self.tracker.use_image(to.id, &to.name, Access::TransferWrite, &pass);
+        self.uses_range(from, from.all(), Access::TransferRead);
+        self.uses_image(to, Access::TransferWrite);
         let layout = Access::TransferWrite.layout();
         let (handle, buffer) = self.raw();
         // SAFETY: both are borrowed until the commands have run; the layout is that of a transfer write (tracked).
@@ -304,9 +317,8 @@ impl<'r> Commands<'r> {
     pub fn copy_between(&mut self, from: &'r Image, to: &'r Image) {
         let of = |image: &Image| (image.shape.format, image.shape.width, image.shape.height);
         assert_eq!(of(from), of(to), "{} and {}", from.name, to.name);
-        let pass = self.pass_name();
-        self.tracker.use_image(from.id, &from.name, Access::TransferRead, &pass);
-        self.tracker.use_image(to.id, &to.name, Access::TransferWrite, &pass);
+        self.uses_image(from, Access::TransferRead);
+        self.uses_image(to, Access::TransferWrite);
         let vk::BufferImageCopy { image_subresource: layers, image_extent, .. } = packed(from);
         let region = vk::ImageCopy::default().src_subresource(layers).dst_subresource(layers).extent(image_extent);
         let [read, write] = [Access::TransferRead, Access::TransferWrite].map(Access::layout);
@@ -321,9 +333,8 @@ impl<'r> Commands<'r> {
     pub fn fill_levels(&mut self, from: &'r Image, texture: &'r Texture, width: u32) {
         let to = texture.image();
         self.image_barrier(to, None, Access::TransferWrite);
-        let pass = self.pass_name();
-        self.tracker.use_image(from.id, &from.name, Access::TransferRead, &pass);
-        self.tracker.use_image(to.id, &to.name, Access::TransferWrite, &pass);
+        self.uses_image(from, Access::TransferRead);
+        self.uses_image(to, Access::TransferWrite);
         let [read, write] = [Access::TransferRead, Access::TransferWrite].map(Access::layout);
         let (handle, buffer) = self.raw();
         let layers = packed(to).image_subresource;
@@ -331,28 +342,16 @@ impl<'r> Commands<'r> {
             let [width, height] = [width, to.shape.height].map(|size| (size >> level).max(1).cast_signed());
             [vk::Offset3D::default(), vk::Offset3D { x: width, y: height, z: 1 }]
         };
-        let turn = |level: u32, from: vk::ImageLayout, to_layout: vk::ImageLayout| {
-            let range = vk::ImageSubresourceRange { base_mip_level: level, level_count: 1, ..to.whole() };
-            let barriers = [vk::ImageMemoryBarrier2::default()
-                .image(to.raw())
-                .subresource_range(range)
-                .old_layout(from)
-                .new_layout(to_layout)
-                .src_stage_mask(vk::PipelineStageFlags2::ALL_TRANSFER)
-                .src_access_mask(vk::AccessFlags2::TRANSFER_WRITE)
-                .dst_stage_mask(vk::PipelineStageFlags2::ALL_TRANSFER)
-                .dst_access_mask(vk::AccessFlags2::TRANSFER_READ)];
-            // SAFETY: the command buffer is recording and outside a render pass; the image is borrowed until it has run.
-            unsafe {
-                handle.cmd_pipeline_barrier2(buffer, &vk::DependencyInfo::default().image_memory_barriers(&barriers));
-            }
+        let turn = |level: u32, layouts: [vk::ImageLayout; 2]| {
+            let part = vk::ImageSubresourceRange { base_mip_level: level, level_count: 1, ..to.whole() };
+            self.turn(to, part, layouts, between(Access::TransferWrite, Access::TransferRead));
         };
         let extent = vk::Extent3D { width, height: to.shape.height, depth: 1 };
         let first = [vk::ImageCopy::default().src_subresource(layers).dst_subresource(layers).extent(extent)];
         // SAFETY: both are borrowed until the commands have run, and the layouts are those stated above.
         unsafe { handle.cmd_copy_image(buffer, from.raw(), read, to.raw(), write, &first) };
-        for level in 1..to.levels() {
-            turn(level - 1, write, read);
+        for level in 1..to.levels {
+            turn(level - 1, [write, read]);
             let region = [vk::ImageBlit::default()
                 .src_subresource(vk::ImageSubresourceLayers { mip_level: level - 1, ..layers })
                 .src_offsets(corner(level - 1))
@@ -362,7 +361,7 @@ impl<'r> Commands<'r> {
             unsafe { handle.cmd_blit_image(buffer, to.raw(), read, to.raw(), write, &region, vk::Filter::LINEAR) };
         }
         // All levels have one layout again.
-        (0..to.levels() - 1).for_each(|level| turn(level, read, write));
+        (0..to.levels - 1).for_each(|level| turn(level, [read, write]));
         self.image_barrier(to, Some(Access::TransferWrite), Access::GraphicsSampled);
     }
 
@@ -377,9 +376,9 @@ impl<'r> Commands<'r> {
         self.end()?.launch(Signals::default())
     }
 
-    /// Whether the caller of the library uses the queue and what is on the device too ([`Device::is_shared`]).
+    /// Whether the caller of the library uses the queue and what is on the device too.
     pub fn is_shared(&self) -> bool {
-        self.recording.device.is_shared()
+        self.recording.device.is_shared
     }
 
     /// Barrier between all that was submitted to the queue before and all commands that follow in this recording.

@@ -6,7 +6,7 @@ use super::access::Access;
 use super::commands::Commands;
 use super::image::Image;
 use super::memory::{Buffer, TexelView};
-use super::pipeline::Layout;
+use super::pipeline::{Layout, Pipeline};
 use super::reflect::Binding;
 use super::texture::Texture;
 use crate::error::{Error, Result};
@@ -45,11 +45,13 @@ fn complain(pass: &str, binding: &Binding, what: &str) -> ! {
 const SETS_PER_POOL: u32 = 256;
 
 impl<'r> Commands<'r> {
-    pub(super) fn push<P: Pod>(&mut self, layout: &Layout, name: &str, push: &P) {
+    pub(super) fn push<P: Pod>(&mut self, pipeline: &Pipeline, push: &P) {
+        let layout = pipeline.layout();
         let bytes = bytemuck::bytes_of(push);
         assert!(
             bytes.len() >= layout.push_bytes as usize && (layout.push_bytes > 0 || bytes.is_empty()),
-            "{name}: {} bytes of push constants given, the shader has {}",
+            "{}: {} bytes of push constants given, the shader has {}",
+            pipeline.name,
             bytes.len(),
             layout.push_bytes
         );
@@ -64,17 +66,16 @@ impl<'r> Commands<'r> {
     /// Writes a descriptor set for `resources`, binds it, and reports to the tracker how the shader uses each resource.
     pub(super) fn bind(
         &mut self,
-        layout: &Layout,
-        name: &str,
+        pipeline: &Pipeline,
         point: vk::PipelineBindPoint,
         resources: &[Bind<'r>],
     ) -> Result<()> {
         use vk::DescriptorType as Kind;
+        let layout = pipeline.layout();
         if layout.bindings.is_empty() {
             return Ok(());
         }
         let set = self.descriptor_set(layout)?;
-        let pass = self.pass_name();
         let graphics = point == vk::PipelineBindPoint::GRAPHICS;
         let sampled = if graphics { Access::GraphicsSampled } else { Access::ComputeSampled };
         for binding in &layout.bindings {
@@ -89,47 +90,35 @@ impl<'r> Commands<'r> {
             let mut images = [Default::default()];
             match (binding.kind, resource) {
                 (Kind::STORAGE_BUFFER | Kind::UNIFORM_BUFFER, Bind::Buffer(_) | Bind::Range(..)) => {
-                    let (buffer, range) = self.buffer_range(binding, resource, name)?;
+                    let (buffer, range) = self.buffer_range(binding, resource, &pipeline.name)?;
                     let size = range.end - range.start;
-                    let access = match (binding.kind, binding.writes) {
-                        (Kind::STORAGE_BUFFER, true) => Access::ComputeWrite,
-                        _ => Access::ComputeRead,
-                    };
-                    self.tracker.use_range(buffer.id, &buffer.name, range.clone(), access, &pass);
+                    let access = if binding.writes { Access::ComputeWrite } else { Access::ComputeRead };
+                    self.uses_range(buffer, range.clone(), access);
                     buffers = [vk::DescriptorBufferInfo { buffer: buffer.raw(), offset: range.start, range: size }];
                     write = write.buffer_info(&buffers);
                 }
                 (Kind::UNIFORM_TEXEL_BUFFER, Bind::Texel(view)) => {
                     let buffer = view.buffer;
-                    self.tracker.use_range(buffer.id, &buffer.name, buffer.all(), sampled, &pass);
+                    self.uses_range(buffer, buffer.all(), sampled);
                     views = [view.handle];
                     write = write.texel_buffer_view(&views);
                 }
-                (Kind::SAMPLED_IMAGE, Bind::Image(image)) => {
-                    self.tracker.use_image(image.id, &image.name, sampled, &pass);
+                (Kind::SAMPLED_IMAGE | Kind::STORAGE_IMAGE, Bind::Image(image)) => {
+                    let access = if binding.writes { Access::ComputeWrite } else { sampled };
+                    self.uses_image(image, access);
                     images = [vk::DescriptorImageInfo {
                         sampler: vk::Sampler::null(),
                         image_view: image.view(),
-                        image_layout: sampled.layout(),
-                    }];
-                    write = write.image_info(&images);
-                }
-                (Kind::STORAGE_IMAGE, Bind::Image(image)) => {
-                    self.tracker.use_image(image.id, &image.name, Access::ComputeWrite, &pass);
-                    images = [vk::DescriptorImageInfo {
-                        sampler: vk::Sampler::null(),
-                        image_view: image.view(),
-                        image_layout: Access::ComputeWrite.layout(),
+                        image_layout: access.layout(),
                     }];
                     write = write.image_info(&images);
                 }
                 (Kind::COMBINED_IMAGE_SAMPLER, Bind::Texture(texture)) => {
-                    let image = texture.image();
-                    self.tracker.use_image(image.id, &image.name, sampled, &pass);
+                    self.uses_image(texture.image(), sampled);
                     images = [texture.descriptor()];
                     write = write.image_info(&images);
                 }
-                _ => complain(name, binding, "another kind of resource, or none, was given"),
+                _ => complain(&pipeline.name, binding, "another kind of resource, or none, was given"),
             }
             // SAFETY: the set is fresh and not yet in use; every resource is borrowed until the commands have run.
             unsafe { self.recording.device.handle.update_descriptor_sets(&[write], &[]) };

@@ -1,7 +1,7 @@
 //! Logical device and queue: the root that every other Vulkan object keeps alive.
 
 use super::Checked;
-use super::instance::{Instance, OwnInstance};
+use super::instance::Instance;
 use super::pipeline::CachedPipeline;
 use super::select::{Candidate, choose, physical_devices, queue_family};
 use super::shader::{sealed, unsealed};
@@ -46,7 +46,8 @@ pub struct Device {
     pub(super) handle: ash::Device,
     #[cfg(feature = "view")]
     pub(super) physical: vk::PhysicalDevice,
-    is_shared: bool,
+    /// Whether a caller made the device, uses its queue too and destroys it.
+    pub(super) is_shared: bool,
     pub(super) queue: Mutex<vk::Queue>,
     /// Fences of launched recordings; see `flight`.
     pub(super) flights: Mutex<Vec<vk::Fence>>,
@@ -62,7 +63,7 @@ pub struct Device {
     pub cache_dir: Option<PathBuf>,
     pub(super) next_resource: AtomicU64,
     pub(super) allocated_bytes: AtomicU64,
-    omitted_barrier: AtomicUsize,
+    pub(super) omitted_barrier: AtomicUsize,
     /// Last: the instance outlives the device.
     pub(super) instance: Arc<Instance>,
 }
@@ -129,9 +130,8 @@ impl Device {
                 instance.handle.get_physical_device_properties(physical),
             )
         };
-        let named = |own: &OwnInstance| own.has_debug_utils;
-        let names = instance.own.as_ref().is_some_and(named);
-        let names = names.then(|| ash::ext::debug_utils::Device::new(&instance.handle, &handle));
+        let own = instance.own.as_ref().filter(|own| own.has_debug_utils);
+        let names = own.map(|_| ash::ext::debug_utils::Device::new(&instance.handle, &handle));
         let mut device = Device {
             handle,
             #[cfg(feature = "view")]
@@ -155,11 +155,6 @@ impl Device {
         };
         device.pipeline_cache = device.load_pipeline_cache()?;
         Ok(Arc::new(device))
-    }
-
-    /// Whether a caller made the device, uses its queue too and destroys it.
-    pub fn is_shared(&self) -> bool {
-        self.is_shared
     }
 
     /// Memory of all buffers and images that exist now, bytes.
@@ -187,10 +182,6 @@ impl Device {
     /// reports it; `None` restores normal recording.
     pub fn omit_barrier(&self, index: Option<usize>) {
         self.omitted_barrier.store(index.unwrap_or(usize::MAX), Ordering::Relaxed);
-    }
-
-    pub(super) fn omitted_barrier(&self) -> usize {
-        self.omitted_barrier.load(Ordering::Relaxed)
     }
 
     /// The driver's compiled pipelines on disk. Only what this program wrote, for this very device, reaches a driver.

@@ -5,7 +5,7 @@ use super::commands::Commands;
 use super::descriptors::Bind;
 use super::image::Image;
 use super::memory::Buffer;
-use super::pipeline::GraphicsPipeline;
+use super::pipeline::{GraphicsPipeline, Pipeline};
 use crate::error::Result;
 use ash::vk;
 use bytemuck::Pod;
@@ -44,9 +44,8 @@ impl<'r> Commands<'r> {
     ) -> Result<()> {
         let [first, last] = ends;
         let load = if first { vk::AttachmentLoadOp::CLEAR } else { vk::AttachmentLoadOp::LOAD };
-        let pass = self.pass_name();
         let shape = target.color.shape;
-        self.tracker.use_image(target.color.id, &target.color.name, Access::ColorWrite, &pass);
+        self.uses_image(target.color, Access::ColorWrite);
         let mut color = vk::RenderingAttachmentInfo::default()
             .image_view(target.color.view())
             .image_layout(Access::ColorWrite.layout())
@@ -54,7 +53,7 @@ impl<'r> Commands<'r> {
             .store_op(vk::AttachmentStoreOp::STORE)
             .clear_value(vk::ClearValue { color: vk::ClearColorValue { float32: target.clear.unwrap_or_default() } });
         if let Some(resolve) = target.resolve.filter(|_| last) {
-            self.tracker.use_image(resolve.id, &resolve.name, Access::ColorWrite, &pass);
+            self.uses_image(resolve, Access::ColorWrite);
             color = color
                 .store_op(vk::AttachmentStoreOp::DONT_CARE)
                 .resolve_mode(vk::ResolveModeFlags::AVERAGE)
@@ -62,7 +61,7 @@ impl<'r> Commands<'r> {
                 .resolve_image_layout(Access::ColorWrite.layout());
         }
         let depth = target.depth.map(|depth| {
-            self.tracker.use_image(depth.id, &depth.name, Access::DepthWrite, &pass);
+            self.uses_image(depth, Access::DepthWrite);
             vk::RenderingAttachmentInfo::default()
                 .image_view(depth.view())
                 .image_layout(Access::DepthWrite.layout())
@@ -77,7 +76,7 @@ impl<'r> Commands<'r> {
         let mut colors = vec![color];
         if let Some(second) = target.second {
             assert!(target.resolve.is_none() && first && last, "{}: a second image is drawn at once", second.name);
-            self.tracker.use_image(second.id, &second.name, Access::ColorWrite, &pass);
+            self.uses_image(second, Access::ColorWrite);
             colors.push(color.image_view(second.view()).load_op(vk::AttachmentLoadOp::DONT_CARE));
         }
         let extent = vk::Extent2D { width: shape.width, height: shape.height };
@@ -101,26 +100,25 @@ impl<'r> Commands<'r> {
 
 pub struct Drawing<'c, 'r> {
     commands: &'c mut Commands<'r>,
-    pipeline: Option<&'r GraphicsPipeline>,
+    pipeline: Option<&'r Pipeline>,
 }
 
 impl<'r> Drawing<'_, 'r> {
     /// Selects the pipeline and its vertex buffers, in order of location, and the index buffer (32-bit). Both sides of
     /// triangles are drawn, until [`Drawing::cull`].
     pub fn bind(&mut self, pipeline: &'r GraphicsPipeline, vertices: &[(&'r Buffer, u64)], indices: &'r Buffer) {
-        assert_eq!(vertices.len(), pipeline.inputs.len(), "{}: vertex buffers against shader inputs", pipeline.name);
-        let pass = self.commands.pass_name();
-        let tracker = &mut self.commands.tracker;
+        let GraphicsPipeline { pipeline, inputs } = pipeline;
+        assert_eq!(vertices.len(), inputs.len(), "{}: vertex buffers against shader inputs", pipeline.name);
         for (buffer, offset) in vertices {
-            tracker.use_range(buffer.id, &buffer.name, *offset..buffer.size_bytes, Access::VertexRead, &pass);
+            self.commands.uses_range(buffer, *offset..buffer.size_bytes, Access::VertexRead);
         }
-        tracker.use_range(indices.id, &indices.name, indices.all(), Access::VertexRead, &pass);
+        self.commands.uses_range(indices, indices.all(), Access::VertexRead);
         let (handle, buffer) = self.commands.raw();
         // SAFETY: everything is borrowed until the commands have run.
         unsafe {
             handle.cmd_bind_pipeline(buffer, vk::PipelineBindPoint::GRAPHICS, pipeline.raw());
             handle.cmd_set_cull_mode(buffer, vk::CullModeFlags::NONE);
-            for (input, (vertex, offset)) in pipeline.inputs.iter().zip(vertices) {
+            for (input, (vertex, offset)) in inputs.iter().zip(vertices) {
                 handle.cmd_bind_vertex_buffers(buffer, input.location, &[vertex.raw()], &[*offset]);
             }
             handle.cmd_bind_index_buffer(buffer, indices.raw(), 0, vk::IndexType::UINT32);
@@ -137,9 +135,10 @@ impl<'r> Drawing<'_, 'r> {
     /// Draws one triangle that covers the area, with a pipeline whose vertex shader makes it from `gl_VertexIndex`;
     /// `resources` are images that its fragment shader reads, at their binding numbers.
     pub fn screen<P: Pod>(&mut self, pipeline: &'r GraphicsPipeline, resources: &[Bind<'r>], push: &P) -> Result<()> {
-        assert!(pipeline.inputs.is_empty(), "{}: makes its own vertices", pipeline.name);
-        self.commands.bind(pipeline.layout(), &pipeline.name, vk::PipelineBindPoint::GRAPHICS, resources)?;
-        self.commands.push(pipeline.layout(), &pipeline.name, push);
+        let GraphicsPipeline { pipeline, inputs } = pipeline;
+        assert!(inputs.is_empty(), "{}: makes its own vertices", pipeline.name);
+        self.commands.bind(pipeline, vk::PipelineBindPoint::GRAPHICS, resources)?;
+        self.commands.push(pipeline, push);
         let (handle, buffer) = self.commands.raw();
         // SAFETY: pipeline and resources are borrowed until the commands are submitted; the vertex shader reads no
         // buffer.
@@ -154,7 +153,7 @@ impl<'r> Drawing<'_, 'r> {
     /// Binds images that the bound pipeline's fragment shader reads, at their binding numbers.
     pub fn resources(&mut self, resources: &[Bind<'r>]) -> Result<()> {
         let pipeline = self.pipeline.expect("a pipeline is bound before its resources");
-        self.commands.bind(pipeline.layout(), &pipeline.name, vk::PipelineBindPoint::GRAPHICS, resources)
+        self.commands.bind(pipeline, vk::PipelineBindPoint::GRAPHICS, resources)
     }
 
     /// Sets viewport and scissor to a rectangle in pixels: left, top, width and height.
@@ -185,7 +184,7 @@ impl<'r> Drawing<'_, 'r> {
     /// Sets the bound pipeline's push constants.
     pub fn push<P: Pod>(&mut self, push: &P) {
         let pipeline = self.pipeline.expect("a pipeline is bound before its push constants");
-        self.commands.push(pipeline.layout(), &pipeline.name, push);
+        self.commands.push(pipeline, push);
     }
 
     /// Draws the triangles of a range of corners, three a triangle, with a pipeline whose vertex shader finds corner

@@ -105,8 +105,13 @@ impl Recording {
         Ok((counts.raw(), 4 * pass as u64))
     }
 
+    /// The current pass, or the recording where it has none yet.
+    pub fn pass_name(&self) -> &str {
+        self.passes.last().unwrap_or(&self.name)
+    }
+
     fn last_pass(&self) -> String {
-        format!("{}, last pass {}", self.name, self.passes.last().unwrap_or(&self.name))
+        format!("{}, last pass {}", self.name, self.pass_name())
     }
 
     /// Submits; the caller must wait before it releases anything that the recording uses.

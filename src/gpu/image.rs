@@ -26,7 +26,7 @@ pub struct Image {
     image: vk::Image,
     /// Dropped after the view: the swapchain, or the image itself before its memory.
     _owner: Arc<dyn Any + Send + Sync>,
-    levels: u32,
+    pub(super) levels: u32,
     pub shape: ImageShape,
     pub name: String,
     pub(super) id: u64,
@@ -134,10 +134,6 @@ impl Image {
 
     pub(super) fn view(&self) -> vk::ImageView {
         self.view.handle
-    }
-
-    pub(super) fn levels(&self) -> u32 {
-        self.levels
     }
 
     /// All levels of its one layer.

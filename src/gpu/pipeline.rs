@@ -83,14 +83,31 @@ pub(super) struct CachedPipeline {
 }
 
 impl CachedPipeline {
+    /// No submission may be under way that uses it.
+    pub(super) fn destroy(&self, device: &Device) {
+        // SAFETY: as the caller says.
+        unsafe { device.handle.destroy_pipeline(self.handle, None) };
+        self.layout.destroy(device);
+    }
+}
+
+/// A pipeline of either kind, by the name of one who uses it.
+pub(super) struct Pipeline {
+    cached: Arc<CachedPipeline>,
+    /// Destroys it.
+    _device: Arc<Device>,
+    pub(super) name: String,
+}
+
+impl Pipeline {
     /// The pipeline of these shaders that `device` keeps, or the one that `make` makes of them.
-    fn of(
-        device: &Device,
+    fn new(
+        device: &Arc<Device>,
         name: &str,
         shaders: &[&Shader],
         state: &str,
         make: impl FnOnce(&Layout) -> Result<Vec<vk::Pipeline>>,
-    ) -> Result<Arc<Self>> {
+    ) -> Result<Self> {
         let mut hasher = blake3::Hasher::new();
         hasher.update(state.as_bytes());
         shaders.iter().for_each(|shader| {
@@ -99,8 +116,13 @@ impl CachedPipeline {
         });
         let key = *hasher.finalize().as_bytes();
         let pipelines = || device.pipelines.lock().unwrap_or_else(PoisonError::into_inner);
+        let named = |cached: &Arc<CachedPipeline>| Pipeline {
+            cached: cached.clone(),
+            _device: device.clone(),
+            name: name.into(),
+        };
         if let Some(found) = pipelines().get(&key) {
-            return Ok(found.clone());
+            return Ok(named(found));
         }
         let layout = Layout::new(device, name, shaders)?;
         let start = Instant::now();
@@ -109,20 +131,21 @@ impl CachedPipeline {
         log::log!(if ms < LEAST_TOLD_MS { Level::Trace } else { Level::Debug }, "pipeline {name}: {ms:.0} ms");
         device.name(handle, name);
         match pipelines().entry(key) {
-            Entry::Vacant(place) => Ok(place.insert(Arc::new(CachedPipeline { handle, layout })).clone()),
+            Entry::Vacant(place) => Ok(named(place.insert(Arc::new(CachedPipeline { handle, layout })))),
             // Another thread was quicker.
             Entry::Occupied(place) => {
                 CachedPipeline { handle, layout }.destroy(device);
-                Ok(place.get().clone())
+                Ok(named(place.get()))
             }
         }
     }
 
-    /// No submission may be under way that uses it.
-    pub(super) fn destroy(&self, device: &Device) {
-        // SAFETY: as the caller says.
-        unsafe { device.handle.destroy_pipeline(self.handle, None) };
-        self.layout.destroy(device);
+    pub(super) fn raw(&self) -> vk::Pipeline {
+        self.cached.handle
+    }
+
+    pub(super) fn layout(&self) -> &Layout {
+        &self.cached.layout
     }
 }
 
@@ -177,16 +200,13 @@ const LEAST_TOLD_MS: f64 = 5.0;
 
 /// One compute shader, ready to dispatch.
 pub struct ComputePipeline {
-    cached: Arc<CachedPipeline>,
-    /// Destroys it.
-    _device: Arc<Device>,
+    pub(super) pipeline: Pipeline,
     pub local_size: [u32; 3],
-    pub name: String,
 }
 
 impl ComputePipeline {
     pub fn new(device: &Arc<Device>, name: &str, shader: &Shader) -> Result<Self> {
-        let cached = CachedPipeline::of(device, name, &[shader], "", |layout| {
+        let pipeline = Pipeline::new(device, name, &[shader], "", |layout| {
             let module = Module::new(device, shader)?;
             let stage = vk::PipelineShaderStageCreateInfo::default()
                 .stage(vk::ShaderStageFlags::COMPUTE)
@@ -198,16 +218,7 @@ impl ComputePipeline {
                 .map_err(|(_, code)| code)
                 .checked("vkCreateComputePipelines", name)
         })?;
-        let local_size = shader.reflection.local_size;
-        Ok(ComputePipeline { cached, _device: device.clone(), local_size, name: name.into() })
-    }
-
-    pub(super) fn raw(&self) -> vk::Pipeline {
-        self.cached.handle
-    }
-
-    pub(super) fn layout(&self) -> &Layout {
-        &self.cached.layout
+        Ok(ComputePipeline { pipeline, local_size: shader.reflection.local_size })
     }
 }
 
@@ -245,11 +256,8 @@ impl GraphicsState {
 /// A vertex and a fragment shader, ready to draw indexed triangles. Vertex input `location` reads tightly packed floats
 /// from the vertex buffer bound at the same number.
 pub struct GraphicsPipeline {
-    cached: Arc<CachedPipeline>,
-    /// Destroys it.
-    _device: Arc<Device>,
+    pub(super) pipeline: Pipeline,
     pub(super) inputs: Vec<VertexInput>,
-    pub name: String,
 }
 
 impl GraphicsPipeline {
@@ -261,7 +269,7 @@ impl GraphicsPipeline {
         state: GraphicsState,
     ) -> Result<Self> {
         let inputs = vertex.reflection.inputs.clone();
-        let cached = CachedPipeline::of(device, name, &[vertex, fragment], &format!("{state:?}"), |layout| {
+        let pipeline = Pipeline::new(device, name, &[vertex, fragment], &format!("{state:?}"), |layout| {
             let modules = [Module::new(device, vertex)?, Module::new(device, fragment)?];
             let stages = [(vk::ShaderStageFlags::VERTEX, modules[0].1), (vk::ShaderStageFlags::FRAGMENT, modules[1].1)]
                 .map(|(stage, module)| {
@@ -312,15 +320,7 @@ impl GraphicsPipeline {
                 .map_err(|(_, code)| code)
                 .checked("vkCreateGraphicsPipelines", name)
         })?;
-        Ok(GraphicsPipeline { cached, _device: device.clone(), inputs, name: name.into() })
-    }
-
-    pub(super) fn raw(&self) -> vk::Pipeline {
-        self.cached.handle
-    }
-
-    pub(super) fn layout(&self) -> &Layout {
-        &self.cached.layout
+        Ok(GraphicsPipeline { pipeline, inputs })
     }
 }
 

@@ -161,8 +161,7 @@ impl SharpPermutation {
 
     /// The macros of every shader that evaluates sharp lights.
     fn shared(&self, row: ShaderPermutation) -> ShaderPermutation {
-        let row = row
-            .define("WORKGROUP", CLUSTER_VERTICES)
+        row.define("WORKGROUP", CLUSTER_VERTICES)
             .define("TEXEL", self.reads == Reads::Texels)
             .define("UNIFORM", self.reads == Reads::StorageUniform)
             .define("ENTITY_LIMIT", self.entity_limit)
@@ -191,51 +190,50 @@ impl SharpPermutation {
             .define("LAMPS", self.lamps)
             .define("ROLLED", self.rolled)
             .define("NODE_CELLS", self.silhouette.cells)
-            .define("MAP", self.silhouette.map_px);
-        let numbers = [
-            ("REACH", REACH),
-            ("SHELL_STEP", SHELL_STEP),
-            ("LAST_SHELL", (SHELLS - 1) as f64),
-            ("INSIDE_FROM", INSIDE[0]),
-            ("INSIDE_TO", INSIDE[1]),
-            ("HALF_DEPTH", HALF_DEPTH),
-            ("DEEP_FROM", DEEP[0]),
-            ("DEEP_TO", DEEP[1]),
-            ("CONTACT", CONTACT),
-            ("BEYOND_SHEET", BEYOND_SHEET),
-            ("CONE_WIDER", CONE_WIDER),
-            ("BALL_WIDER", BALL_WIDER),
-            ("EDGE_STEPS", EDGE_STEPS),
-            ("MOST_STEPS", MOST_STEPS),
-            ("BLENDED_MISS", BLENDED_MISS),
-            ("MOST_MISS", MOST_MISS),
-            ("FLAT", FLAT),
-            ("FLAT_BIAS", FLAT_BIAS),
-            ("ROUND_BIAS", ROUND_BIAS),
-            ("LEAST_BLUR", LEAST_BLUR),
-            ("DARKENED", DARKENED),
-            ("TOUCHING_TEXELS", TOUCHING_TEXELS),
-            ("LEAST_FACING", LEAST_FACING),
-            ("STILL_THERE", STILL_THERE),
-            ("NEAR_LIGHT", (NEAR_LIGHT_STEPS / EDGE_STEPS).powi(2)),
-            ("MOST_SINE", MOST_SINE),
-            ("LIMIT_SINE", LIMIT_SINE),
-            ("LIMIT_OUTLINE", LIMIT_OUTLINE),
-            ("BLEND", BLEND),
-            ("CORNER", CORNER),
-            ("STRIP", STRIP),
-            ("THIN", THIN),
-            ("BEYOND", BEYOND),
-            ("EASED", EASED),
-            ("LEAST_AHEAD", LEAST_AHEAD),
-            ("TURNED_X", TURNED_BY[0]),
-            ("TURNED_Y", TURNED_BY[1]),
-            ("TURNED_Z", TURNED_BY[2]),
-            ("WARP_0", CELL_WARP[0]),
-            ("WARP_1", CELL_WARP[1]),
-            ("WARP_2", CELL_WARP[2]),
-        ];
-        numbers.into_iter().fold(row, |row, (name, value)| row.number(name, value)).outlines().self_visibility()
+            .define("MAP", self.silhouette.map_px)
+            .number("REACH", REACH)
+            .number("SHELL_STEP", SHELL_STEP)
+            .number("LAST_SHELL", (SHELLS - 1) as f64)
+            .number("INSIDE_FROM", INSIDE[0])
+            .number("INSIDE_TO", INSIDE[1])
+            .number("HALF_DEPTH", HALF_DEPTH)
+            .number("DEEP_FROM", DEEP[0])
+            .number("DEEP_TO", DEEP[1])
+            .number("CONTACT", CONTACT)
+            .number("BEYOND_SHEET", BEYOND_SHEET)
+            .number("CONE_WIDER", CONE_WIDER)
+            .number("BALL_WIDER", BALL_WIDER)
+            .number("EDGE_STEPS", EDGE_STEPS)
+            .number("MOST_STEPS", MOST_STEPS)
+            .number("BLENDED_MISS", BLENDED_MISS)
+            .number("MOST_MISS", MOST_MISS)
+            .number("FLAT", FLAT)
+            .number("FLAT_BIAS", FLAT_BIAS)
+            .number("ROUND_BIAS", ROUND_BIAS)
+            .number("LEAST_BLUR", LEAST_BLUR)
+            .number("DARKENED", DARKENED)
+            .number("TOUCHING_TEXELS", TOUCHING_TEXELS)
+            .number("LEAST_FACING", LEAST_FACING)
+            .number("STILL_THERE", STILL_THERE)
+            .number("NEAR_LIGHT", (NEAR_LIGHT_STEPS / EDGE_STEPS).powi(2))
+            .number("MOST_SINE", MOST_SINE)
+            .number("LIMIT_SINE", LIMIT_SINE)
+            .number("LIMIT_OUTLINE", LIMIT_OUTLINE)
+            .number("BLEND", BLEND)
+            .number("CORNER", CORNER)
+            .number("STRIP", STRIP)
+            .number("THIN", THIN)
+            .number("BEYOND", BEYOND)
+            .number("EASED", EASED)
+            .number("LEAST_AHEAD", LEAST_AHEAD)
+            .number("TURNED_X", TURNED_BY[0])
+            .number("TURNED_Y", TURNED_BY[1])
+            .number("TURNED_Z", TURNED_BY[2])
+            .number("WARP_0", CELL_WARP[0])
+            .number("WARP_1", CELL_WARP[1])
+            .number("WARP_2", CELL_WARP[2])
+            .outlines()
+            .self_visibility()
     }
 
     /// The permutation with the loops that the device wants, and with storage blocks where its texel views cannot hold

@@ -75,6 +75,11 @@ fn level_of_mean(cosine: f64) -> (f64, [f64; 3]) {
 }
 
 impl Lobe {
+    /// What it reflects of unit light from everywhere, of a unit Fresnel factor.
+    fn energy(&self) -> f64 {
+        self.taps.iter().map(|tap| tap.weight).sum()
+    }
+
     /// The lobe of a roughness, seen at a cosine to the normal.
     pub fn new(roughness: f64, view_z: f64) -> Self {
         let alpha = brdf::alpha(roughness);
@@ -142,7 +147,7 @@ pub fn energy(roughness: f64, view_z: f64) -> f64 {
     let [row, column] = [roughness, (1.0 - view_z).max(0.0).sqrt()].map(|at| at.clamp(0.0, 1.0) * last);
     let [low, left] = [row, column].map(|at| (at as usize).min(TABLE - 2));
     let [up, right] = [row - low as f64, column - left as f64];
-    let of = |row: usize, column: usize| LOBES[row * TABLE + column].taps.iter().map(|tap| tap.weight).sum::<f64>();
+    let of = |row: usize, column: usize| LOBES[row * TABLE + column].energy();
     let along = |row: usize| (1.0 - right) * of(row, left) + right * of(row, left + 1);
     (1.0 - up) * along(low) + up * along(low + 1)
 }
@@ -156,8 +161,7 @@ pub fn mean_energy(roughness: f32) -> f32 {
             // Columns are even in the root of 1 - cosine, so that each stands for that root times twice a step.
             let cosine = column_cosine(column);
             let weight = cosine * (1.0 - cosine).sqrt();
-            let energy: f64 = LOBES[row * TABLE + column].taps.iter().map(|tap| tap.weight).sum();
-            sums[0] += weight * energy;
+            sums[0] += weight * LOBES[row * TABLE + column].energy();
             sums[1] += weight;
         }
         sums[0] / sums[1]
@@ -220,7 +224,7 @@ mod tests {
         for (roughness, view_z) in [(0.4, 0.9), (0.5, 0.3), (0.7, 0.6), (1.0, 0.95), (1.0, 0.2), (0.85, 0.05)] {
             let [energy, schlick] = by_lights(roughness, view_z);
             let lobe = Lobe::new(roughness, view_z);
-            let found: f64 = lobe.taps.iter().map(|tap| tap.weight).sum();
+            let found = lobe.energy();
             assert!((found - energy).abs() < 0.01, "{roughness} {view_z}: {found}, not {energy}");
             assert!((lobe.grazing - schlick).abs() < 0.005, "{roughness} {view_z}: {}, not {schlick}", lobe.grazing);
             assert!(energy < 1.0 && lobe.grazing < found);
@@ -230,8 +234,7 @@ mod tests {
     #[test]
     fn a_mirror_has_its_taps_where_the_view_is_mirrored() {
         let lobe = Lobe::new(0.0, 0.6);
-        let energy: f64 = lobe.taps.iter().map(|tap| tap.weight).sum();
-        assert!((energy - 1.0).abs() < 0.01, "{energy}");
+        assert!((lobe.energy() - 1.0).abs() < 0.01, "{}", lobe.energy());
         for tap in &lobe.taps {
             let direction = direction(tap, brdf::LEAST_ALPHA, f64::acos(0.6));
             assert!((direction - DVec2::new(0.8, 0.6)).length() < 0.02, "{direction}");

@@ -31,6 +31,18 @@ pub struct SharpObject<'f> {
     pub opacity: f64,
 }
 
+impl SharpObject<'_> {
+    /// A direction of the world in the object's frame.
+    fn turned(&self, direction: DVec3) -> DVec3 {
+        self.rotation.inverse() * direction
+    }
+
+    /// A place of the world in the object's frame, in its bounding radii from its centre.
+    fn local(&self, place: DVec3) -> DVec3 {
+        self.turned(place - self.centre) / self.radius_m
+    }
+}
+
 #[derive(Clone, Copy, Debug)]
 pub struct SharpLight<'f> {
     pub entity: usize,
@@ -121,27 +133,24 @@ impl SharpTwin<'_> {
             sheets.iter().flat_map(|object| Some((object.sheet?.seen(&eye), object.opacity))).collect();
         let near = |object: &SharpObject<'_>, toward: DVec3| {
             let field = object.silhouette.expect("what blocks or shines by its outline has a silhouette field");
-            let local = |v: DVec3| object.rotation.inverse() * v;
-            field.near(local(point.position - object.centre) / object.radius_m, local(toward))
+            field.near(object.local(point.position), object.turned(toward))
         };
         let blocked = |object: &SharpObject<'_>, near: &Near, part: &LightPart, distance_m: f64| {
             let field = object.silhouette.expect("as in `near`");
-            let toward = object.rotation.inverse() * part.toward;
-            field.blocked(near, toward, distance_m / object.radius_m, part.tangent())
+            field.blocked(near, object.turned(part.toward), distance_m / object.radius_m, part.tangent())
         };
-        let colors =
-            light.colors.map(|colors| (colors.mean, colors.seen(shining.rotation.inverse() * seen.toward, seen.sine)));
+        let colors = light.colors.map(|colors| (colors.mean, colors.seen(shining.turned(seen.toward), seen.sine)));
         let color = |part: &LightPart| {
             let Some((mean, plane)) = &colors else { return DVec3::ONE };
             let aside = (part.toward - part.toward.dot(seen.toward) * seen.toward) / seen.sine;
-            *mean * color_at(plane, shining.rotation.inverse() * aside)
+            *mean * color_at(plane, shining.turned(aside))
         };
         let block = |(number, (toward, parts)): (usize, (DVec3, [LightPart; BLOCK]))| -> DVec3 {
             let between: Vec<Near> = occluders.iter().map(|object| near(object, toward)).collect();
             // From afar the light is one block, which its area covers.
             let is_whole = number == 0 && seen.fine < 1.0;
             let area = shining.area.filter(|_| share.is_none() && is_whole);
-            let share = share.or(area.map(|area| area.at(shining.rotation.inverse() * seen.toward)));
+            let share = share.or(area.map(|area| area.at(shining.turned(seen.toward))));
             let own = share.is_none().then(|| near(shining, toward));
             let part = |part: &LightPart| {
                 let pairs = occluders.iter().zip(&between);
@@ -149,11 +158,11 @@ impl SharpTwin<'_> {
                     .map(|(object, near)| 1.0 - object.opacity * blocked(object, near, part, part.distance))
                     .product();
                 let past_cuboid = |object: &&SharpObject<'_>| {
-                    let local = |v: DVec3| object.rotation.inverse() * v;
-                    let point = local(point.position - object.centre) / object.radius_m;
+                    let toward = object.turned(part.toward);
                     let distance = part.distance / object.radius_m;
-                    let blocked =
-                        object.cuboid.map(|cuboid| cuboid.blocked(point, local(part.toward), distance, part.tangent()));
+                    let blocked = object
+                        .cuboid
+                        .map(|cuboid| cuboid.blocked(object.local(point.position), toward, distance, part.tangent()));
                     1.0 - object.opacity * blocked.unwrap_or(0.0)
                 };
                 let past_cuboids: f64 = cuboids.iter().map(past_cuboid).product();
@@ -167,15 +176,9 @@ impl SharpTwin<'_> {
                 let covers =
                     share.unwrap_or(0.0) + own.as_ref().map_or(0.0, |near| blocked(shining, near, part, f64::INFINITY));
                 let sees = self.self_maps.filter(|_| !is_free).map_or(1.0, |maps| {
-                    let toward = receiver.rotation.inverse() * part.toward;
                     let map = &maps[v * BYTES..][..BYTES];
-                    self_visibility::visible(
-                        map,
-                        point.own_normal,
-                        toward,
-                        part.sine,
-                        part.distance / receiver.radius_m,
-                    )
+                    let distance = part.distance / receiver.radius_m;
+                    self_visibility::visible(map, point.own_normal, receiver.turned(part.toward), part.sine, distance)
                 });
                 part.share(point.normal) * sees * covers * through * past_cuboids * past_sheets.free * color(part)
             };

@@ -73,29 +73,27 @@ pub struct Glossy {
 
 /// The macros of every shader that includes `glsl/gloss.glsl`.
 pub fn macros(row: ShaderPermutation) -> ShaderPermutation {
-    let numbers = [
-        ("PIXEL_ROUGHNESS", f64::from(PIXEL_ROUGHNESS)),
-        ("LEAST_COSINE", LEAST_COSINE),
-        ("LEAST_SHARE", LEAST_SHARE),
-        ("MOST_SHARE", MOST_SHARE),
-        ("LEAST_HIDDEN", LEAST_HIDDEN),
-        ("MOST_NEARBY", MOST_NEARBY),
-        ("LEAST_VIEW_Z", LEAST_VIEW_Z),
-        ("LEAST_ALPHA", brdf::LEAST_ALPHA),
-        ("LEAST_ENERGY", LEAST_ENERGY),
-        ("MOST_TILTED", MOST_TILTED),
-        ("LEAST_HALF_Z", LEAST_HALF_Z),
-        ("MOST_SLOPES", MOST_SLOPES),
-        ("WIDENED", WIDENED),
-        ("WIDE_OUTLINE", WIDE_OUTLINE),
-        ("LEAST_HIGHLIGHT", LEAST_HIGHLIGHT),
-        ("LOW_FROM", LOW_HALF_Z[0]),
-        ("LOW_TO", LOW_HALF_Z[1]),
-        ("TABLE", lobe::TABLE as f64),
-        ("LEVELS", lobe::LEVELS as f64),
-        ("MAP_SIDE", sky_map::SIDE as f64),
-    ];
-    numbers.into_iter().fold(row, |row, (name, value)| row.number(name, value)).define("TAPS", lobe::TAPS as u32)
+    row.number("PIXEL_ROUGHNESS", f64::from(PIXEL_ROUGHNESS))
+        .number("LEAST_COSINE", LEAST_COSINE)
+        .number("LEAST_SHARE", LEAST_SHARE)
+        .number("MOST_SHARE", MOST_SHARE)
+        .number("LEAST_HIDDEN", LEAST_HIDDEN)
+        .number("MOST_NEARBY", MOST_NEARBY)
+        .number("LEAST_VIEW_Z", LEAST_VIEW_Z)
+        .number("LEAST_ALPHA", brdf::LEAST_ALPHA)
+        .number("LEAST_ENERGY", LEAST_ENERGY)
+        .number("MOST_TILTED", MOST_TILTED)
+        .number("LEAST_HALF_Z", LEAST_HALF_Z)
+        .number("MOST_SLOPES", MOST_SLOPES)
+        .number("WIDENED", WIDENED)
+        .number("WIDE_OUTLINE", WIDE_OUTLINE)
+        .number("LEAST_HIGHLIGHT", LEAST_HIGHLIGHT)
+        .number("LOW_FROM", LOW_HALF_Z[0])
+        .number("LOW_TO", LOW_HALF_Z[1])
+        .number("TABLE", lobe::TABLE as f64)
+        .number("LEVELS", lobe::LEVELS as f64)
+        .number("MAP_SIDE", sky_map::SIDE as f64)
+        .define("TAPS", lobe::TAPS as u32)
 }
 
 /// `links` where light bounces.

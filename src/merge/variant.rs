@@ -5,7 +5,7 @@ use crate::field::lattice::{CELL_WARP, Lattice};
 use crate::field::quantity::{Storage, channel_stride};
 use crate::field::sheet::CONTACT;
 use crate::gpu::Device;
-use crate::layout::{ALIGNMENT, CLUSTER_VERTICES, DeviceEntity, ENTRY_BITS};
+use crate::layout::{ALIGNMENT, CLUSTER_VERTICES, DeviceEntity, ENTRY_BITS, QUAD_FORMAT};
 use crate::lists::skip::{CAP_SINES, CAP_SPREAD, CONES_MEET_RAD, SKIP_FADE_RAD, Skip};
 use crate::merge::twin::BEHIND_SHEET;
 use crate::sh::basis::{Y00, coefficient_count};
@@ -111,7 +111,7 @@ pub struct MergePermutation {
 impl MergePermutation {
     pub fn field_format(&self) -> vk::Format {
         match self.storage {
-            Storage::F32 => vk::Format::R32G32B32A32_SFLOAT,
+            Storage::F32 => QUAD_FORMAT,
             Storage::F16 if self.packed() => vk::Format::R32G32B32A32_UINT,
             Storage::F16 => vk::Format::R16G16B16A16_SFLOAT,
         }
@@ -158,9 +158,6 @@ impl MergePermutation {
             .define("SHELLS", lattice.shells)
             .define("CELLS", lattice.cells);
         let row = self.skip.merge_defines().fold(row, |row, (name, on)| row.define(name, on));
-        ["WARP_0", "WARP_1", "WARP_2"]
-            .into_iter()
-            .zip(CELL_WARP)
-            .fold(row, |row, (name, value)| row.number(name, value))
+        row.number("WARP_0", CELL_WARP[0]).number("WARP_1", CELL_WARP[1]).number("WARP_2", CELL_WARP[2])
     }
 }

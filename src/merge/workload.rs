@@ -5,13 +5,14 @@ use crate::error::{Error, Result};
 use crate::field::Lattice;
 use crate::field::quantity::{Storage, channel_stride};
 use crate::gpu::{Bind, Buffer, BufferKind, Commands, Device};
-use crate::layout::{CLUSTER_FORMAT, CLUSTER_VERTICES, Cluster, DeviceEntity, ENTRY_FORMAT, ListEntry, NONE};
+use crate::layout::{
+    CLUSTER_FORMAT, CLUSTER_VERTICES, Cluster, DeviceEntity, ENTRY_FORMAT, ListEntry, NONE, QUAD_FORMAT,
+};
 use crate::lists::skip::Skip;
 use crate::merge::variant::{MergePermutation, Reads, Variant, uniform_entities};
 use crate::merge::{Merge, MergeInputs};
 use crate::sh::rotation::turns;
 use crate::shaders::Library;
-use ash::vk;
 use glam::{DQuat, DVec3};
 use std::sync::Arc;
 
@@ -135,17 +136,16 @@ impl Workload {
     }
 
     fn inputs(&self, variant: Variant) -> Result<MergeInputs<'_>> {
-        let floats = vk::Format::R32G32B32A32_SFLOAT;
         let read = |buffer, format| Bind::read(variant.reads == Reads::Texels, buffer, format);
         Ok(MergeInputs {
             through: None,
-            entities: read(&self.entities, floats)?,
+            entities: read(&self.entities, QUAD_FORMAT)?,
             entries: read(&self.entries, ENTRY_FORMAT)?,
             clusters: read(&self.clusters, CLUSTER_FORMAT)?,
             fields: read(&self.fields, self.permutation(variant).field_format())?,
-            transfers: read(&self.transfers, floats)?,
-            vertices: read(&self.vertices, floats)?,
-            sky: read(&self.sky, floats)?,
+            transfers: read(&self.transfers, QUAD_FORMAT)?,
+            vertices: read(&self.vertices, QUAD_FORMAT)?,
+            sky: read(&self.sky, QUAD_FORMAT)?,
         })
     }
 

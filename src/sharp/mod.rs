@@ -19,7 +19,9 @@ use crate::field::sub_light::{
     BLEND, CORNER, LIMIT_OUTLINE, LIMIT_SINE, MOST_SINE, NEAR_LIGHT_STEPS, STRIP, THIN, TURNED_BY,
 };
 use crate::gpu::{Bind, Buffer, Commands, ComputePipeline, Device, TexelView};
-use crate::layout::{CLUSTER_FORMAT, CLUSTER_VERTICES, ENTRY_BITS, ENTRY_FORMAT, MOST_SUN_MAPS, SHOWN_LIGHTS};
+use crate::layout::{
+    CLUSTER_FORMAT, CLUSTER_VERTICES, ENTRY_BITS, ENTRY_FORMAT, MOST_SUN_MAPS, QUAD_FORMAT, SHOWN_LIGHTS,
+};
 use crate::merge::variant::Reads;
 use crate::shaders::{Library, ShaderPermutation};
 use ash::vk;
@@ -248,8 +250,7 @@ impl SharpPermutation {
     /// Whether the device's texel views hold nodes and cells of silhouette fields, and a quad of light for every
     /// vertex.
     pub fn fits_views(device: &Device, [nodes, cells, soft]: [&Buffer; 3]) -> bool {
-        let quads = vk::Format::R32G32B32A32_SFLOAT;
-        [nodes, soft].into_iter().all(|buffer| TexelView::fits(device, quads, buffer.size_bytes))
+        [nodes, soft].into_iter().all(|buffer| TexelView::fits(device, QUAD_FORMAT, buffer.size_bytes))
             && TexelView::fits(device, vk::Format::R32G32_UINT, cells.size_bytes)
     }
 }
@@ -320,24 +321,23 @@ impl Sharp {
         let SharpPermutation { reads, self_shadows, edges, .. } = self.permutation;
         let irradiances = inputs.irradiances.filter(|_| edges);
         let read = |buffer: &'r Buffer, format| Bind::read(reads == Reads::Texels, buffer, format);
-        let quads = vk::Format::R32G32B32A32_SFLOAT;
         let mut resources = vec![
-            read(inputs.entities, quads)?,
+            read(inputs.entities, QUAD_FORMAT)?,
             read(inputs.entries, ENTRY_FORMAT)?,
             read(inputs.clusters, CLUSTER_FORMAT)?,
-            read(inputs.nodes, quads)?,
+            read(inputs.nodes, QUAD_FORMAT)?,
             read(inputs.cells, vk::Format::R32G32_UINT)?,
-            read(inputs.vertices, quads)?,
+            read(inputs.vertices, QUAD_FORMAT)?,
             Bind::Buffer(radiosity),
             if self_shadows { read(inputs.self_cells, vk::Format::R32G32_UINT)? } else { Bind::None },
-            read(inputs.soft, quads)?,
+            read(inputs.soft, QUAD_FORMAT)?,
             inputs.shown.map_or(Bind::None, |[lights, _]| Bind::Buffer(lights)),
             inputs.shown.map_or(Bind::None, |[_, shares]| Bind::Buffer(shares)),
             inputs.lamps.map_or(Bind::None, Bind::Buffer),
             irradiances.map_or(Bind::None, |(buffer, _)| Bind::Buffer(buffer)),
         ];
         if let Some([maps, texels]) = inputs.lamp_maps {
-            resources.push(Bind::Texel(TexelView::new(maps, quads)?));
+            resources.push(Bind::Texel(TexelView::new(maps, QUAD_FORMAT)?));
             resources.push(Bind::Texel(TexelView::new(texels, vk::Format::R32_SFLOAT)?));
         }
         let elements = [cluster_count * CLUSTER_VERTICES, 1, 1];

@@ -17,7 +17,7 @@ use crate::bake::links::{self, RUNS, Runs};
 use crate::error::Result;
 use crate::field::cuboid::Cuboid;
 use crate::field::self_visibility;
-use crate::gpu::{Bind, Buffer, Commands, ComputePipeline, Device, Upload};
+use crate::gpu::{Bind, Buffer, BufferKind, Commands, ComputePipeline, Device, Upload};
 use crate::layout::CLUSTER_VERTICES;
 use crate::lists::far::FarRuns;
 use crate::lists::incremental::{CUT_HEADER, ClusterLists, Reflectors};
@@ -216,7 +216,7 @@ impl Movers {
             cluster_count: 0,
             pairs: Upload::new(device, "distant movers", 64)?,
             pair_count: 0,
-            spheres: Upload::on_device(device, "distant movers as spheres", 64)?,
+            spheres: Upload::of_kind(device, "distant movers as spheres", BufferKind::Device, 64)?,
             boxes: Boxes::new(device, library, &surfaces.boxes, lists, &permutation)?,
             edges: buffer("boxes that move", &edges)?,
             permutation,

@@ -164,7 +164,7 @@ impl Mirrors {
     pub fn record<'r>(&'r self, commands: &mut Commands<'r>, viewports: &[DrawnViewport<'r>]) -> Result<()> {
         if viewports.is_empty() {
             // They are bound, and not read.
-            self.levels.iter().for_each(|levels| commands.image_barrier(levels.image(), None, Access::GraphicsSampled));
+            self.levels.iter().for_each(|levels| commands.image_barrier(&levels.image, None, Access::GraphicsSampled));
             return Ok(());
         }
         // The parts in use, and what filters of the coarsest level read beside them.

@@ -331,7 +331,7 @@ impl<'r> Commands<'r> {
     /// image of its own size. The image was made the source of a copy; the texture loses its content and is ready to be
     /// sampled.
     pub fn fill_levels(&mut self, from: &'r Image, texture: &'r Texture, width: u32) {
-        let to = texture.image();
+        let to = &texture.image;
         self.image_barrier(to, None, Access::TransferWrite);
         self.uses_image(from, Access::TransferRead);
         self.uses_image(to, Access::TransferWrite);

@@ -114,7 +114,7 @@ impl<'r> Commands<'r> {
                     write = write.image_info(&images);
                 }
                 (Kind::COMBINED_IMAGE_SAMPLER, Bind::Texture(texture)) => {
-                    self.uses_image(texture.image(), sampled);
+                    self.uses_image(&texture.image, sampled);
                     images = [texture.descriptor()];
                     write = write.image_info(&images);
                 }

@@ -250,12 +250,8 @@ impl Upload {
         Self::of_kind(device, name, BufferKind::Upload, size_bytes)
     }
 
-    /// One that the device alone writes and reads, of a size that changes from frame to frame.
-    pub fn on_device(device: &Arc<Device>, name: &str, size_bytes: u64) -> Result<Self> {
-        Self::of_kind(device, name, BufferKind::Device, size_bytes)
-    }
-
-    fn of_kind(device: &Arc<Device>, name: &str, kind: BufferKind, size_bytes: u64) -> Result<Self> {
+    /// Of [`BufferKind::Device`]: one that the device alone writes, of a size that changes from frame to frame.
+    pub fn of_kind(device: &Arc<Device>, name: &str, kind: BufferKind, size_bytes: u64) -> Result<Self> {
         let one = || Buffer::new(device, name, kind, size_bytes);
         Ok(Upload { buffers: [one()?, one()?], last: 0 })
     }

@@ -23,7 +23,7 @@ pub struct Level<'t> {
 /// A picture that shaders sample, bilinear.
 pub struct Texture {
     sampler: Owned<vk::Sampler>,
-    image: Image,
+    pub image: Image,
 }
 
 impl Texture {
@@ -106,10 +106,6 @@ impl Texture {
         commands.copy_regions(&staging, &self.image, &regions);
         commands.image_barrier(&self.image, Some(Access::TransferWrite), Access::GraphicsSampled);
         commands.submit().map(|_| ())
-    }
-
-    pub fn image(&self) -> &Image {
-        &self.image
     }
 
     pub(super) fn descriptor(&self) -> vk::DescriptorImageInfo {

@@ -13,7 +13,7 @@
 pub use crate::layout::GROUP_CLUSTERS;
 use crate::layout::{self, ListEntry};
 pub use crate::lists::scene_bounds::{
-    ClusterBounds, EntityBounds, Globe, Occludes, OutlineShape, OutlineView, SceneBounds, distance_key,
+    ClusterBounds, EntityBounds, Globe, Occludes, OutlineShape, OutlineView, SceneBounds,
 };
 use crate::lists::scope::{CullResult, Scope, SphereView};
 

@@ -155,8 +155,8 @@ impl ClusterLists {
         let first = self.clusters.len() - near.len();
         let bounds = &self.bounds[first..];
         let beside = |a: usize, b: usize| {
-            let apart = Vec3::from(bounds[a].centre).distance(Vec3::from(bounds[b].centre));
-            apart <= bounds[a].radius_m + bounds[b].radius_m + side_m
+            let apart_m = bounds[a].centre.distance(bounds[b].centre);
+            apart_m <= bounds[a].radius_m + bounds[b].radius_m + side_m
         };
         let differs =
             |cluster: usize| (0..near.len()).any(|other| near[other] != near[cluster] && beside(cluster, other));
@@ -360,8 +360,8 @@ impl ClusterLists {
         for entity in of.movers.clone() {
             let first = all.entries.len();
             if !of.rests[entity] {
-                let [x, y, z, radius_m] = scene_bounds.spheres[entity];
-                let Cut { near, far } = of.far.cut(Vec3::new(x, y, z), radius_m);
+                let sphere = scene_bounds.spheres[entity];
+                let Cut { near, far } = of.far.cut(sphere.truncate(), sphere.w);
                 all.entries.extend([near, far].concat());
             }
             all.cuts.push([first, all.entries.len() - first].map(|place| place as u32));

@@ -9,7 +9,7 @@ use crate::lists::skip::Skip;
 use crate::lists::tree::Tree;
 use crate::scene::Placement;
 use crate::scene::groups::Groups;
-use glam::{DQuat, DVec3, Vec3};
+use glam::{DQuat, DVec3, Vec3, Vec4};
 use std::f64::consts::PI;
 use std::sync::Arc;
 
@@ -21,10 +21,10 @@ pub(super) const CONE_ROUNDING_RAD: f64 = 1e-3;
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ClusterBounds {
     /// Centre of a sphere around the vertices.
-    pub centre: [f32; 3],
+    pub centre: Vec3,
     pub radius_m: f32,
     /// Unit axis of a cone around the normals.
-    pub axis: [f32; 3],
+    pub axis: Vec3,
     /// Cosine of its half-angle with `CONE_ROUNDING_RAD`; -1 where it bounds nothing.
     pub cosine: f32,
 }
@@ -34,10 +34,10 @@ impl ClusterBounds {
     pub fn from_parts(centre: DVec3, radius_m: f64, axis: DVec3, spread_rad: f64) -> Self {
         let rounded = centre.as_vec3();
         ClusterBounds {
-            centre: rounded.to_array(),
+            centre: rounded,
             // What rounding of the centre, here and where it is turned, may add.
             radius_m: ((radius_m + centre.distance(rounded.as_dvec3()) + 1e-6 * centre.length()) * (1.0 + 1e-6)) as f32,
-            axis: axis.as_vec3().to_array(),
+            axis: axis.as_vec3(),
             cosine: (spread_rad + CONE_ROUNDING_RAD).min(PI).cos() as f32,
         }
     }
@@ -49,9 +49,8 @@ impl ClusterBounds {
     }
 
     pub fn union(parts: &[ClusterBounds]) -> Self {
-        let vector = |v: [f32; 3]| Vec3::from_array(v).as_dvec3();
-        let spheres = parts.iter().map(|b| (vector(b.centre), f64::from(b.radius_m)));
-        let cones = parts.iter().map(|b| (vector(b.axis), f64::from(b.cosine).acos()));
+        let spheres = parts.iter().map(|b| (b.centre.as_dvec3(), f64::from(b.radius_m)));
+        let cones = parts.iter().map(|b| (b.axis.as_dvec3(), f64::from(b.cosine).acos()));
         Self::around(spheres.collect(), cones.collect())
     }
 
@@ -140,7 +139,7 @@ pub struct SceneBounds {
     /// Those of the scene, and then the boxes of some of them.
     pub entities: Vec<EntityBounds>,
     /// Their bounding spheres: centre in the world and radius, metres.
-    pub spheres: Vec<[f32; 4]>,
+    pub spheres: Vec<Vec4>,
     /// Outlines of those that have one, by entity; empty where no light is sharp.
     pub outlines: Vec<Option<OutlineView>>,
     pub globes: Vec<Globe>,
@@ -174,8 +173,8 @@ impl SceneBounds {
 
     /// Sorts `entities` for the lists.
     pub fn new(entities: Vec<EntityBounds>, sky: Option<f64>, skip: Skip, eps: f64) -> Self {
-        let sphere = |entity: &EntityBounds| entity.centre.as_vec3().extend(entity.radius_m as f32).to_array();
-        let spheres: Vec<[f32; 4]> = entities.iter().map(sphere).collect();
+        let sphere = |entity: &EntityBounds| entity.centre.as_vec3().extend(entity.radius_m as f32);
+        let spheres: Vec<Vec4> = entities.iter().map(sphere).collect();
         let occluders = (0..).zip(&entities).filter(|(_, entity)| entity.occludes != Occludes::Nothing);
         let mut lights: Vec<u32> = (0..).zip(&entities).filter(|(_, entity)| entity.emits).map(|(j, _)| j).collect();
         // The chains of sharp lights come first on every list.
@@ -208,16 +207,10 @@ impl SceneBounds {
     /// The key by which the occluders of a receiver are ordered, near to far from the centre of its bounding sphere:
     /// products truncated in another order differ (by up to 0.006 over twelve occluders), which would show as seams, so
     /// there is one order for a whole receiver. Equal distances go by index. Sheets come last, for loops of their own.
+    /// The bits of a squared distance rise with it, as it is not negative. The f64 twins go by it too.
     pub fn order(&self, receiver: u32, occluder: u32) -> (bool, u32, u32) {
-        let [[x, y, z, _], [cx, cy, cz, _]] = [occluder, receiver].map(|i| self.spheres[i as usize]);
+        let [from, to] = [receiver, occluder].map(|i| self.spheres[i as usize].truncate());
         let is_sheet = self.entities[occluder as usize].sheet.is_some();
-        (is_sheet, distance_key([x, y, z], [cx, cy, cz]), occluder)
+        (is_sheet, to.distance_squared(from).to_bits(), occluder)
     }
-}
-
-/// The key by which [`SceneBounds::order`] goes: the bits of the squared distance of two centres in f32, which rise
-/// with it as it is not negative. The f64 twins go by it too.
-pub fn distance_key(a: [f32; 3], b: [f32; 3]) -> u32 {
-    let [x, y, z] = [a[0] - b[0], a[1] - b[1], a[2] - b[2]];
-    (x * x + y * y + z * z).to_bits()
 }

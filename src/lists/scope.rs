@@ -14,7 +14,7 @@ use crate::lists::scene_bounds::{
 };
 use crate::lists::skip::{CAP_SINES, SKIP_FADE_RAD};
 use crate::lists::tree::Crowd;
-use glam::{DVec2, DVec3};
+use glam::{DVec2, DVec3, Vec4};
 use std::f64::consts::PI;
 
 /// What an outline's distance may be off by, in r: more than the step of a map and what blending four of them errs by.
@@ -160,18 +160,18 @@ impl<'m> Scope<'m> {
         near: &'m [u32],
     ) -> Self {
         let scale = f64::from(receiver.scale);
-        let [x, y, z, inverse_radius] = receiver.centre;
-        let vector = |[x, y, z]: [f32; 3]| DVec3::new(x.into(), y.into(), z.into());
+        let [x, y, z, inverse_radius] = receiver.centre.map(f64::from);
+        let middle = DVec3::new(x, y, z);
         Scope {
             scene,
             index,
             near,
             reflectance: scene.entities[index].reflectance,
-            centre: vector([x, y, z]) + to_world(receiver, vector(bounds.centre) * scale),
+            centre: middle + to_world(receiver, bounds.centre.as_dvec3() * scale),
             radius_m: f64::from(bounds.radius_m) * scale,
-            axis: to_world(receiver, vector(bounds.axis)),
+            axis: to_world(receiver, bounds.axis.as_dvec3()),
             spread: Angle::of_cosine(bounds.cosine.into()),
-            receiver: (vector([x, y, z]), CONTACT / f64::from(inverse_radius)),
+            receiver: (middle, CONTACT / inverse_radius),
         }
     }
 
@@ -192,10 +192,10 @@ impl<'m> Scope<'m> {
     }
 
     /// A sphere of the scene: centre in the world, radius.
-    pub fn view(&self, [x, y, z, sphere_radius]: [f32; 4]) -> SphereView {
+    pub fn view(&self, sphere: Vec4) -> SphereView {
         let skip = self.scene.skip;
-        let sphere_radius = f64::from(sphere_radius);
-        let to = DVec3::new(x.into(), y.into(), z.into()) - self.centre;
+        let sphere_radius = f64::from(sphere.w);
+        let to = sphere.truncate().as_dvec3() - self.centre;
         let distance = to.length().max(1e-15);
         let toward = to / distance;
         let nearest = distance - self.radius_m;
@@ -331,7 +331,7 @@ impl<'m> Scope<'m> {
     /// the cone is wide beside the object, all of them miss the object, or all of them meet it.
     pub fn outline_result(&self, occluder: usize, light: u32) -> CullResult {
         let skip = self.scene.skip;
-        let [x, y, z, light_radius] = self.scene.spheres[light as usize];
+        let sphere = self.scene.spheres[light as usize].as_dvec4();
         let is_around = |globe: &&Globe| globe.occluder as usize == occluder && globe.light == light;
         if let Some(Globe { mesh, placement, .. }) = self.scene.globes.iter().find(is_around)
             && !mesh.holds(placement.local(self.centre))
@@ -342,11 +342,10 @@ impl<'m> Scope<'m> {
             return CullResult::Listed;
         };
         let EntityBounds { centre, radius_m, .. } = self.scene.entities[occluder];
-        let to_light = DVec3::new(x.into(), y.into(), z.into()) - self.centre;
+        let to_light = sphere.truncate() - self.centre;
         let distance = to_light.length().max(1e-15);
         let toward = to_light / distance;
-        let width =
-            |way: f64| self.radius_m + (f64::from(light_radius) - self.radius_m) * (way / distance).clamp(0.0, 1.0);
+        let width = |way: f64| self.radius_m + (sphere.w - self.radius_m) * (way / distance).clamp(0.0, 1.0);
         let along = (centre - self.centre).dot(toward);
         let clear = width(along - radius_m).max(width(along + radius_m)) / radius_m + OUTLINE_MARGIN;
         let point = outline.to_object * (self.centre - centre) / radius_m;
@@ -359,7 +358,7 @@ impl<'m> Scope<'m> {
         };
         // An object covers a light only if all of it lies between.
         let between = along - INSIDE[1] * radius_m - self.radius_m > 0.0
-            && distance - along - INSIDE[1] * radius_m - f64::from(light_radius) > 0.0;
+            && distance - along - INSIDE[1] * radius_m - sphere.w > 0.0;
         match found {
             found if skip.passed && found < -clear => CullResult::LeftOff,
             found if skip.covered && outline.opaque && between && found > clear => CullResult::Covers,
@@ -386,10 +385,9 @@ impl<'m> Scope<'m> {
 
     /// A bound of the weight of every member at every cluster within the bounds.
     fn crowd_weight(&self, crowd: &Crowd) -> f64 {
-        let [x, y, z] = crowd.centre.map(f64::from);
         let reach = f64::from(crowd.reach_m);
         let largest = f64::from(crowd.radius_m);
-        let to = DVec3::new(x, y, z) - self.centre;
+        let to = crowd.centre.as_dvec3() - self.centre;
         let distance = to.length().max(1e-15);
         let blur = self.radius_m + reach;
         let nearest = distance - blur;

@@ -74,15 +74,15 @@ impl TriangleRun {
         };
         let normals: Vec<Vec3> = triangles.iter().filter_map(normal).collect();
         let bounds = ClusterBounds::new(&corners, &normals);
-        let centre = Vec3::from_array(bounds.centre);
+        let centre = bounds.centre;
         let half = corners.iter().fold(Vec3::ZERO, |half, corner| half.max((*corner - centre).abs()));
         let spread = f64::from(bounds.cosine).acos() + BACK_RAD;
-        let known = Vec3::from_array(bounds.axis) != Vec3::ZERO;
+        let known = bounds.axis != Vec3::ZERO;
         TriangleRun {
             centre,
             radius_m: bounds.radius_m,
             half_m: half + Vec3::splat(1e-6 * (centre.length() + bounds.radius_m)),
-            axis: bounds.axis.into(),
+            axis: bounds.axis,
             spread: if known { [spread.cos() as f32, spread.sin() as f32] } else { [-1.0, 0.0] },
             rim: false,
         }

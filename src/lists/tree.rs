@@ -1,7 +1,7 @@
 //! A tree of spheres over the entities of a scene, so that a group of clusters finds those that matter to it without
 //! looking at the rest.
 
-use glam::Vec3;
+use glam::{Vec3, Vec4};
 use std::ops::Range;
 
 /// Entities in a leaf: below this, looking at each costs less than another level.
@@ -11,28 +11,28 @@ const LEAF_ENTITIES: usize = 4;
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Crowd {
     /// World, metres.
-    pub centre: [f32; 3],
+    pub centre: Vec3,
     pub reach_m: f32,
     pub radius_m: f32,
 }
 
 impl Crowd {
-    pub fn of([x, y, z, radius_m]: [f32; 4]) -> Self {
-        Crowd { centre: [x, y, z], reach_m: 0.0, radius_m }
+    pub fn of(sphere: Vec4) -> Self {
+        Crowd { centre: sphere.truncate(), reach_m: 0.0, radius_m: sphere.w }
     }
 
-    pub fn around(spheres: impl Iterator<Item = [f32; 4]> + Clone) -> Self {
-        let places = spheres.clone().map(|[x, y, z, _]| Vec3::new(x, y, z));
+    pub fn around(spheres: impl Iterator<Item = Vec4> + Clone) -> Self {
+        let places = spheres.clone().map(Vec4::truncate);
         let (low, high) = places
             .clone()
             .fold((Vec3::INFINITY, Vec3::NEG_INFINITY), |(low, high), place| (low.min(place), high.max(place)));
         let centre = low.midpoint(high);
         let reach_m = places.map(|p| p.as_dvec3().distance_squared(centre.as_dvec3())).fold(0.0, f64::max).sqrt();
         Crowd {
-            centre: centre.to_array(),
+            centre,
             // Rounding must not make it smaller.
             reach_m: (reach_m * (1.0 + 1e-6)) as f32,
-            radius_m: spheres.map(|[.., radius]| radius).fold(0.0, f32::max),
+            radius_m: spheres.map(|sphere| sphere.w).fold(0.0, f32::max),
         }
     }
 }
@@ -54,8 +54,8 @@ pub struct Tree {
 
 impl Tree {
     /// A tree over the given entities: index, and sphere of centre and radius.
-    pub fn new(entities: impl Iterator<Item = (u32, [f32; 4])>) -> Self {
-        let mut entities: Vec<(u32, [f32; 4])> = entities.collect();
+    pub fn new(entities: impl Iterator<Item = (u32, Vec4)>) -> Self {
+        let mut entities: Vec<(u32, Vec4)> = entities.collect();
         let mut tree = Tree::default();
         if !entities.is_empty() {
             let count = entities.len();
@@ -65,7 +65,7 @@ impl Tree {
         tree
     }
 
-    fn split(&mut self, entities: &mut [(u32, [f32; 4])], members: Range<usize>) {
+    fn split(&mut self, entities: &mut [(u32, Vec4)], members: Range<usize>) {
         let of = &mut entities[members.clone()];
         let crowd = Crowd::around(of.iter().map(|entity| entity.1));
         let at = self.nodes.len();

@@ -87,18 +87,14 @@ pub fn gather(scope: &Scope<'_>, candidates: &Candidates, out: &mut Vec<u32>) ->
             for (&entity, (view, result)) in listed {
                 if *result == CullResult::Encloses {
                     out.push(ListEntry::Globe { entity, light }.pack());
-                    continue;
-                }
-                if sharp && scope.scene.is_cuboid(entity as usize) {
+                } else if sharp && scope.scene.is_cuboid(entity as usize) {
                     out.push(ListEntry::Cuboid { entity, light }.pack());
-                    continue;
-                }
-                if view.is_sheet() {
+                } else if view.is_sheet() {
                     out.push(ListEntry::Sheet { entity, light }.pack());
-                    continue;
+                } else {
+                    out.extend((view.whole || sharp).then(|| ListEntry::Occlude { entity, light }.pack()));
+                    out.extend((view.cap && !sharp).then(|| ListEntry::Cap { entity, light }.pack()));
                 }
-                out.extend((view.whole || sharp).then(|| ListEntry::Occlude { entity, light }.pack()));
-                out.extend((view.cap && !sharp).then(|| ListEntry::Cap { entity, light }.pack()));
             }
             // Those of one kind are evaluated one after another.
             if sharp {

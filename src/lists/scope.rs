@@ -284,43 +284,24 @@ impl<'m> Scope<'m> {
     /// its part of the view, and at most what the light brings.
     ///
     /// Before a sharp light an occluder counts where any part of it may be nearer than any part of the light's middle
-    /// plane, and where their cones meet, without the fade that bands need.
+    /// plane, and where their cones meet, without the fade that bands need. A sheet blocks what lies beyond its plane:
+    /// in bands a light whose centre does, and of a sharp light the parts that do.
     pub fn may_block(&self, view: &SphereView, light: Option<&SphereView>, sharp: bool, radiance: f64) -> bool {
         if view.below {
             return false;
         }
         let Some(light) = light else { return self.is_enough(radiance * view.weight) };
-        if let Some(sides) = &view.sheet {
-            return self.sheet_may_block(sides, view, light, sharp, radiance);
-        }
-        let reach = if sharp { view.radius } else { 0.0 };
-        if self.scene.skip.behind && view.nearest - reach > light.farthest {
-            return false;
-        }
-        let fade = if sharp { 0.0 } else { SKIP_FADE_RAD };
-        if self.scene.skip.cones && apart(view, light, fade) {
-            return false;
-        }
-        self.is_enough(radiance * view.weight.min(light.weight))
-    }
-
-    /// As [`Scope::may_block`], of a sheet that rises above the horizon. A sheet blocks what lies beyond its
-    /// plane: in bands a light whose centre does, and of a sharp light the parts that do.
-    fn sheet_may_block(
-        &self,
-        sides: &SheetSides,
-        view: &SphereView,
-        light: &SphereView,
-        sharp: bool,
-        radiance: f64,
-    ) -> bool {
-        let light_height = sides.height + sides.normal.dot(light.toward) * (light.nearest + self.radius_m);
-        let reaches = if sharp { light.radius } else { 0.0 };
-        if self.scene.skip.behind && sides.known && light_height + reaches < 0.0 {
-            return false;
-        }
-        // The shares of the four sides of a sheet that is seen at a grazing angle end less than that far from it.
-        if sharp && self.scene.skip.cones && apart(view, light, SKIP_FADE_RAD) {
+        let reach = |sphere: &SphereView| if sharp { sphere.radius } else { 0.0 };
+        let (is_behind, fade_rad) = match &view.sheet {
+            Some(sides) => {
+                let height = sides.height + sides.normal.dot(light.toward) * (light.nearest + self.radius_m);
+                // The shares of the four sides of a sheet that is seen at a grazing angle end less than the fade from it.
+                (sides.known && height + reach(light) < 0.0, sharp.then_some(SKIP_FADE_RAD))
+            }
+            None => (view.nearest - reach(view) > light.farthest, Some(if sharp { 0.0 } else { SKIP_FADE_RAD })),
+        };
+        let skip = self.scene.skip;
+        if skip.behind && is_behind || skip.cones && fade_rad.is_some_and(|fade_rad| apart(view, light, fade_rad)) {
             return false;
         }
         self.is_enough(radiance * view.weight.min(light.weight))

@@ -15,7 +15,7 @@ use std::sync::Arc;
 
 /// The silhouette fields of a scene. Where it has none, the buffers hold a little of nothing.
 pub struct Silhouettes {
-    /// Two quads a field and three a node, then three of each box, then the colours of lamps, see
+    /// Mesh by mesh two quads of its field and three a node, three of each box, and the colours of a lamp, see
     /// `glsl/silhouette_field.glsl`.
     pub nodes: Buffer,
     /// Two words a cell.
@@ -46,7 +46,7 @@ pub struct MeshSlots {
 
 impl Silhouettes {
     /// Uploads the fields of a scene's meshes and the boxes that `casters` are or consist of, and returns each mesh's
-    /// place. Meshes that share a field share its place. `wants_area` tells of which meshes the area from afar is needed.
+    /// place. Meshes that share a field share its place. `wants_area` tells which meshes need their area from afar.
     pub fn new(
         device: &Arc<Device>,
         baked: &[BakedMesh],
@@ -55,49 +55,43 @@ impl Silhouettes {
     ) -> Result<(Self, Vec<MeshSlots>)> {
         let mut nodes = Vec::<[f32; 4]>::new();
         let mut cells = Vec::<[u32; 2]>::new();
-        let mut known = HashMap::<*const SilhouetteField, u32>::new();
-        let mut slot = |field: &Arc<SilhouetteField>| {
-            let first_quad = *known.entry(Arc::as_ptr(field)).or_insert_with(|| {
-                let first = (nodes.len() + field.faces().len()) as u32;
-                nodes.extend(field.node_quads(cells.len() as u32));
-                cells.extend(field.cells());
-                first
+        let mut fields = HashMap::<*const SilhouetteField, u32>::new();
+        let mut colors = HashMap::<*const LampColors, u32>::new();
+        let of_mesh = |(mesh, (baked, caster)): (usize, (&BakedMesh, &&Arc<Mesh>))| {
+            let silhouette = baked.silhouette.as_ref().map(|field| {
+                let first_quad = *fields.entry(Arc::as_ptr(field)).or_insert_with(|| {
+                    let first = add(&mut nodes, field.node_quads(cells.len() as u32));
+                    cells.extend(field.cells());
+                    first + field.faces().len() as u32
+                });
+                let halves = if field.has_halves() { HAS_HALVES } else { 0 };
+                Slot { first_quad: first_quad | halves, content: field.clone() }
             });
-            let halves = if field.has_halves() { HAS_HALVES } else { 0 };
-            Slot { first_quad: first_quad | halves, content: field.clone() }
-        };
-        let silhouettes: Vec<_> = baked.iter().map(|mesh| mesh.silhouette.as_ref().map(&mut slot)).collect();
-        let mut add_cuboid = |cuboid: &Cuboid| {
-            let first_quad = nodes.len() as u32;
-            nodes.extend(cuboid.quads());
-            first_quad
-        };
-        let mut boxes_of = |caster: &&Arc<Mesh>| {
-            let whole = caster.cuboid().map(|content| Slot { first_quad: add_cuboid(&content), content });
-            let slot = |content: &PlacedCuboid| Slot { first_quad: add_cuboid(&content.cuboid), content: *content };
-            (whole, caster.boxes().iter().map(slot).collect::<Vec<_>>())
-        };
-        let boxes: Vec<_> = casters.iter().map(&mut boxes_of).collect();
-        let mut known_colors = HashMap::<*const LampColors, u32>::new();
-        let mut colors_slot = |colors: &Arc<LampColors>| {
-            let first_quad = *known_colors.entry(Arc::as_ptr(colors)).or_insert_with(|| {
-                let first = nodes.len() as u32;
-                nodes.extend(colors.quads());
-                first
-            });
-            Slot { first_quad, content: colors.clone() }
-        };
-        let colors = baked.iter().map(|mesh| mesh.lamp_colors.as_ref().map(&mut colors_slot));
-        let slots = silhouettes.into_iter().zip(boxes).zip(colors);
-        let of_mesh = |(mesh, ((silhouette, (cuboid, boxes)), lamp_colors))| {
-            let lamp: Option<&Slot<Arc<SilhouetteField>>> = Option::as_ref(&silhouette).filter(|_| wants_area(mesh));
+            let lamp = silhouette.as_ref().filter(|_| wants_area(mesh));
             let lamp_area = lamp.map(|slot| slot.content.area());
+            let cuboid = caster.cuboid().map(|content| Slot { first_quad: add(&mut nodes, content.quads()), content });
+            let slot = |content: &PlacedCuboid| Slot {
+                first_quad: add(&mut nodes, content.cuboid.quads()),
+                content: *content,
+            };
+            let boxes = caster.boxes().iter().map(slot).collect();
+            let lamp_colors = baked.lamp_colors.as_ref().map(|of| {
+                let first_quad = *colors.entry(Arc::as_ptr(of)).or_insert_with(|| add(&mut nodes, of.quads()));
+                Slot { first_quad, content: of.clone() }
+            });
             MeshSlots { silhouette, lamp_area, cuboid, boxes, lamp_colors }
         };
-        let slots = slots.enumerate().map(of_mesh).collect();
+        let slots = baked.iter().zip(casters).enumerate().map(of_mesh).collect();
         nodes.resize(nodes.len().max(ALIGNMENT as usize / 16), [0.0; 4]);
         cells.resize(cells.len().max(ALIGNMENT as usize / 8), [0; 2]);
         let nodes = Buffer::with_data(device, "silhouette nodes", &nodes)?;
         Ok((Silhouettes { nodes, cells: Buffer::with_data(device, "silhouette cells", &cells)? }, slots))
     }
+}
+
+/// Appends quads and returns the place of the first.
+fn add(nodes: &mut Vec<[f32; 4]>, quads: impl IntoIterator<Item = [f32; 4]>) -> u32 {
+    let first = nodes.len() as u32;
+    nodes.extend(quads);
+    first
 }

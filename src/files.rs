@@ -119,9 +119,7 @@ pub fn replace(path: &Path, bytes: &[u8]) -> Result<()> {
 
 /// As [`replace`] for bytes that lie in several places.
 pub fn replace_parts(path: &Path, parts: &[&[u8]]) -> Result<()> {
-    if let Some(folder) = path.parent().filter(|p| !p.as_os_str().is_empty()) {
-        fs::create_dir_all(folder)?;
-    }
+    fs::create_dir_all(folder_of(path))?;
     replace_with(path, |file| parts.iter().try_for_each(|bytes| file.write_all(bytes)))
 }
 

@@ -15,7 +15,7 @@ pub const SIDE: usize = 256;
 /// interpolated to [`SIDE`].
 const SIDES: [usize; 3] = [SIDE, 128, 64];
 /// Coefficients of a product's rows and columns: four bands.
-const COUNT: usize = 16;
+pub(super) const COUNT: usize = 16;
 /// Texels along a side of the map that is filtered, and of the coarser one that wide lobes take.
 const FINE: usize = 128;
 const COARSE: usize = 32;

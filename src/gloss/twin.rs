@@ -1,7 +1,7 @@
 //! The CPU twin of pass "gloss" in f64: what a vertex reflects, from the same table, map and products.
 
 use super::lobe::{self, LEVELS, TABLE, TAPS};
-use super::sky_map::{SIDE, SkyMap};
+use super::sky_map::{COUNT, SIDE, SkyMap};
 use super::{
     LEAST_COSINE, LEAST_HIDDEN, LEAST_SHARE, LEAST_VIEW_Z, MOST_NEARBY, MOST_SHARE, MOST_SLOPES, PIXEL_ROUGHNESS,
     WIDENED, brdf,
@@ -12,8 +12,6 @@ use crate::sh::basis::values;
 use crate::sh::lobe::clamped_cosine;
 use glam::DVec3;
 use std::f64::consts::PI;
-
-const COUNT: usize = 16;
 
 /// Distant light and lobes as shaders read them, rounded to halves.
 pub struct Twin {

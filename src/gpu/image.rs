@@ -36,22 +36,19 @@ impl Image {
     /// An image without content. Depth formats become depth attachments, all else colour attachments.
     pub fn new(device: &Arc<Device>, name: &str, shape: ImageShape) -> Result<Self> {
         use vk::ImageUsageFlags as Use;
+        let ImageShape { format, width, height, samples } = shape;
         let most = device.most_image_px();
-        if shape.width == 0 || shape.height == 0 || shape.width > most || shape.height > most {
-            let width = shape.width;
-            let height = shape.height;
+        if [width, height].iter().any(|px| !(1..=most).contains(px)) {
             return Err(Error::Input(format!("{name}: {width}x{height} is outside the device's 1..={most}")));
         }
-        let depth = shape.format == vk::Format::D32_SFLOAT;
-        let usage = match (depth, shape.samples > 1) {
+        let usage = match (format == vk::Format::D32_SFLOAT, samples > 1) {
             (true, true) => Use::DEPTH_STENCIL_ATTACHMENT,
             (true, false) => Use::DEPTH_STENCIL_ATTACHMENT | Use::SAMPLED,
             (false, true) => Use::COLOR_ATTACHMENT,
             (false, false) => Use::COLOR_ATTACHMENT | Use::SAMPLED | Use::TRANSFER_SRC | Use::TRANSFER_DST,
         };
         // Every device stores to images of this format.
-        let stored = shape.format == vk::Format::R32G32B32A32_UINT;
-        let usage = if stored { usage | Use::STORAGE } else { usage };
+        let usage = if format == vk::Format::R32G32B32A32_UINT { usage | Use::STORAGE } else { usage };
         Self::with_levels(device, name, shape, 1, usage)
     }
 

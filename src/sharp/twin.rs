@@ -158,12 +158,11 @@ impl SharpTwin<'_> {
                     .map(|(object, near)| 1.0 - object.opacity * blocked(object, near, part, part.distance))
                     .product();
                 let past_cuboid = |object: &&SharpObject<'_>| {
+                    let Some(cuboid) = object.cuboid else { return 1.0 };
                     let toward = object.turned(part.toward);
                     let distance = part.distance / object.radius_m;
-                    let blocked = object
-                        .cuboid
-                        .map(|cuboid| cuboid.blocked(object.local(point.position), toward, distance, part.tangent()));
-                    1.0 - object.opacity * blocked.unwrap_or(0.0)
+                    let blocked = cuboid.blocked(object.local(point.position), toward, distance, part.tangent());
+                    1.0 - object.opacity * blocked
                 };
                 let past_cuboids: f64 = cuboids.iter().map(past_cuboid).product();
                 let past_sheets = sheets.iter().fold(SheetShadow::NONE, |shadow, (sheet, opacity)| {

@@ -221,10 +221,7 @@ impl ClusterLists {
         self.now.is_some()
     }
 
-    /// The time of the last update.
-    ///
-    /// # Panics
-    /// Before there was one.
+    /// The time of the last update, which there must have been.
     pub fn now(&self) -> &State {
         self.now.as_ref().expect("updated before")
     }

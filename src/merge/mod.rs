@@ -1,9 +1,7 @@
 //! Pass "merge": light on every vertex of every receiver.
 //!
-//! MergeInputs: entities, clusters and their entries (see [`crate::lists::gather`]), the fields, transfer vectors,
-//! vertices (position and normal, object frame, two quads each), the sky's coefficients. Output: `radiosity`, four
-//! floats a vertex: radiance that leaves the surface, albedo / pi times the integral of incoming light, without
-//! emission.
+//! Output: `radiosity`, four floats a vertex: radiance that leaves the surface, albedo / pi times the integral of
+//! incoming light, without emission.
 
 pub mod calibrate;
 pub mod chain;
@@ -27,6 +25,7 @@ pub struct MergeInputs<'b> {
     pub clusters: Bind<'b>,
     pub fields: Bind<'b>,
     pub transfers: Bind<'b>,
+    /// Position and normal in the object's frame, two quads a vertex.
     pub vertices: Bind<'b>,
     /// Coefficients of the sky, a channel after the other, [`crate::field::quantity::channel_stride`] floats apart;
     /// zero without one.

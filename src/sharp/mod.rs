@@ -1,10 +1,9 @@
 //! Pass "sharp": light of sharp lights on every vertex of every receiver, with what the merge has written.
 //!
-//! SharpInputs: entities, clusters and the front of their lists (chains of sharp lights), silhouette fields, and
-//! vertices (position and normal, object frame, two quads each). A light is cut into parts
-//! ([`crate::field::sub_light`]); in each part the visibilities past all occluders are multiplied. Output: `radiosity`,
-//! as [`crate::merge`] has it, and albedo / pi times the irradiance of sharp lights. Where pixels evaluate lights, the
-//! fourth number tells where they do, and of each light irradiance and occluders are kept ([`KeptIrradiance`]).
+//! A light is cut into parts ([`crate::field::sub_light`]); in each part the visibilities past all occluders are
+//! multiplied. Output: `radiosity`, as [`crate::merge`] has it, and albedo / pi times the irradiance of sharp lights.
+//! Where pixels evaluate lights, the fourth number tells where they do, and of each light irradiance and occluders are
+//! kept ([`KeptIrradiance`]).
 
 pub mod twin;
 

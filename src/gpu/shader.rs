@@ -98,28 +98,21 @@ impl Shader {
 
 /// Every file that a text includes, directly or indirectly, by name; `include` gives the text of one.
 fn gather(name: &str, text: &str, include: &dyn Fn(&str) -> Option<String>) -> Result<BTreeMap<String, String>> {
-    fn visit(
-        chain: &mut Vec<String>,
-        text: &str,
-        include: &dyn Fn(&str) -> Option<String>,
-        found: &mut BTreeMap<String, String>,
-    ) -> Result<()> {
+    let mut found = BTreeMap::new();
+    // Texts that are still to be read, and by which chain of files each was included.
+    let mut open = vec![(name.to_owned(), text.to_owned())];
+    while let Some((chain, text)) = open.pop() {
         let names = text.lines().filter_map(|line| line.trim_start().strip_prefix("#include"));
         for name in names.map(|name| name.trim().trim_matches('"')) {
             if found.contains_key(name) {
                 continue;
             }
-            let included = include(name)
-                .ok_or_else(|| Error::Failed(format!("{}: there is no \"{name}\" to include", chain.join(" > "))))?;
-            chain.push(name.to_owned());
+            let included =
+                include(name).ok_or_else(|| Error::Failed(format!("{chain}: there is no \"{name}\" to include")))?;
             found.insert(name.to_owned(), included.clone());
-            visit(chain, &included, include, found)?;
-            chain.pop();
+            open.push((format!("{chain} > {name}"), included));
         }
-        Ok(())
     }
-    let mut found = BTreeMap::new();
-    visit(&mut vec![name.to_owned()], text, include, &mut found)?;
     Ok(found)
 }
 

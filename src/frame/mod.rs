@@ -435,7 +435,7 @@ impl Frame {
     }
 
     pub fn receiver_vertex_count(&self) -> usize {
-        self.work.lists.clusters.iter().map(|cluster| cluster.vertex_count as usize).sum()
+        self.work.lists.members.iter().map(|member| member.cluster.vertex_count as usize).sum()
     }
 
     /// Whether any light goes through spherical harmonics, so that transfer vectors are baked.

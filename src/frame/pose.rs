@@ -329,7 +329,7 @@ pub(super) fn clusters(
             },
             ..Default::default()
         };
-        Member { cluster, bounds: *bounds, faces: *faces }
+        Member { cluster, bounds: *bounds, faces: *faces, near: Vec::new(), differs: false }
     };
     surface.clusters.iter().zip(&surface.faces).enumerate().map(cluster).collect()
 }

@@ -38,8 +38,8 @@ impl ClusterWork {
         let upload = |name: &str, bytes: usize| Upload::new(device, name, bytes as u64);
         Ok(ClusterWork {
             entities: upload("entities", entity_room * size_of::<layout::DeviceEntity>())?,
-            clusters: upload("clusters", lists.clusters.len() * size_of::<layout::Cluster>())?,
-            entries: upload("entries", 4 * lists.clusters.len())?,
+            clusters: upload("clusters", lists.members.len() * size_of::<layout::Cluster>())?,
+            entries: upload("entries", 4 * lists.members.len())?,
             merged: Merged::default(),
             recorded: AtomicBool::new(true),
             lists,
@@ -95,7 +95,7 @@ impl Frame {
         let dirty = work.lists.update(state);
         let (clusters, entries) = work.lists.gather(&dirty);
         work.merged = Merged {
-            clusters: work.lists.clusters.len(),
+            clusters: work.lists.members.len(),
             merged_clusters: dirty.iter().map(Dirty::cluster_count).sum(),
             merged_entries: entries.len(),
         };

@@ -49,20 +49,17 @@ pub(crate) struct Member {
     pub bounds: ClusterBounds,
     /// The triangles by which its light is seen.
     pub faces: TriangleRun,
+    /// Entities whose shadows of sharp lights are in its own maps.
+    pub near: Vec<u32>,
+    /// Whether the maps of a cluster beside it, of whose vertices its triangles may have some, have others.
+    pub differs: bool,
 }
 
 /// The clusters of all receivers, and which of them have changed since they were merged.
 #[derive(Default)]
 pub(crate) struct ClusterLists {
     threads: usize,
-    /// The clusters; their lists follow separately.
-    pub clusters: Vec<layout::Cluster>,
-    bounds: Vec<ClusterBounds>,
-    faces: Vec<TriangleRun>,
-    /// Entities whose shadows of sharp lights are in a cluster's own maps.
-    near: Vec<Vec<u32>>,
-    /// Whether the maps of a cluster beside one, of whose vertices its triangles may have some, have others.
-    differs: Vec<bool>,
+    pub members: Vec<Member>,
     groups: Vec<WatchedGroup>,
     now: Option<State>,
     /// Every cluster has changed since the last update by something that no [`State`] holds, as the sky.
@@ -129,9 +126,9 @@ impl ClusterLists {
     }
 
     /// Adds the clusters of one receiver, neighbours beside each other.
-    pub fn add(&mut self, receiver: usize, clusters: Vec<Member>) {
-        let first = self.clusters.len();
-        let all: Vec<ClusterBounds> = clusters.iter().map(|member| member.bounds).collect();
+    pub fn add(&mut self, receiver: usize, members: Vec<Member>) {
+        let first = self.members.len();
+        let all: Vec<ClusterBounds> = members.iter().map(|member| member.bounds).collect();
         let mut start = 0;
         while start < all.len() {
             let mut end = start + 1;
@@ -142,38 +139,31 @@ impl ClusterLists {
             self.groups.push(WatchedGroup { receiver, clusters, bounds: ClusterBounds::union(&all[start..end]) });
             start = end;
         }
-        for Member { cluster, bounds, faces } in clusters {
-            self.clusters.push(cluster);
-            self.bounds.push(bounds);
-            self.faces.push(faces);
-        }
+        self.members.extend(members);
     }
 
     /// Says of each cluster of the receiver that was added last which entities' shadows its maps have. The corners of a
     /// triangle are at most `side_m` apart, in the mesh's frame.
     pub fn set_near(&mut self, near: Vec<Vec<u32>>, side_m: f32) {
-        let first = self.clusters.len() - near.len();
-        let bounds = &self.bounds[first..];
+        let first = self.members.len() - near.len();
+        let members = &mut self.members[first..];
         let beside = |a: usize, b: usize| {
-            let apart_m = bounds[a].centre.distance(bounds[b].centre);
-            apart_m <= bounds[a].radius_m + bounds[b].radius_m + side_m
+            let [a, b] = [a, b].map(|cluster| &members[cluster].bounds);
+            a.centre.distance(b.centre) <= a.radius_m + b.radius_m + side_m
         };
         let differs =
             |cluster: usize| (0..near.len()).any(|other| near[other] != near[cluster] && beside(cluster, other));
-        self.differs.resize(first, false);
-        self.differs.extend((0..near.len()).into_par_iter().map(differs).collect::<Vec<_>>());
-        self.near.resize(first, Vec::new());
-        self.near.extend(near);
+        let differs: Vec<bool> = (0..near.len()).into_par_iter().map(differs).collect();
+        for ((member, near), differs) in members.iter_mut().zip(near).zip(differs) {
+            member.near = near;
+            member.differs = differs;
+        }
     }
 
     /// The same for all clusters of a receiver, in order.
     pub fn near_of(&self, receiver: usize) -> impl Iterator<Item = &[u32]> {
-        let of_receiver = move |cluster: &usize| self.clusters[*cluster].receiver as usize == receiver;
-        (0..self.clusters.len()).filter(of_receiver).map(|cluster| self.near(cluster))
-    }
-
-    fn near(&self, cluster: usize) -> &[u32] {
-        self.near.get(cluster).map_or(&[], |near| near)
+        let of_receiver = move |member: &&Member| member.cluster.receiver as usize == receiver;
+        self.members.iter().filter(of_receiver).map(|member| &member.near[..])
     }
 
     /// Forgets what was merged: the next update takes every cluster.
@@ -205,15 +195,12 @@ impl ClusterLists {
         receives: &[bool],
         sights: Option<&[Vec<Sight>]>,
     ) -> impl Iterator<Item = &layout::Cluster> {
-        let wanted = move |(i, cluster): &(usize, &layout::Cluster)| {
-            receives[cluster.receiver as usize] && sights.is_none_or(|sights| self.is_seen(*i, sights))
+        let wanted = move |member: &&Member| {
+            let receiver = member.cluster.receiver as usize;
+            let may_see = |sights: &[Vec<Sight>]| sights[receiver].iter().any(|sight| sight.may_see(&member.faces));
+            receives[receiver] && sights.is_none_or(may_see)
         };
-        self.clusters.iter().enumerate().filter(wanted).map(|(_, cluster)| cluster)
-    }
-
-    fn is_seen(&self, cluster: usize, sights: &[Vec<Sight>]) -> bool {
-        let receiver = self.clusters[cluster].receiver as usize;
-        sights[receiver].iter().any(|sight| sight.may_see(&self.faces[cluster]))
+        self.members.iter().filter(wanted).map(|member| &member.cluster)
     }
 
     /// Whether there was an update, and nothing was forgotten since.
@@ -233,7 +220,7 @@ impl ClusterLists {
         if let Some(moved) = moved.filter(|moved| !(moved.merges_all || moved.flags[group.receiver])) {
             let near = moved.near(now, group.receiver, &group.bounds);
             let on_list = |cluster: usize| {
-                !near.is_empty() && moved.any_on_list(now, group.receiver, &self.bounds[cluster], &near)
+                !near.is_empty() && moved.any_on_list(now, group.receiver, &self.members[cluster].bounds, &near)
             };
             clusters.retain(|&cluster| on_list(cluster));
         }
@@ -248,8 +235,8 @@ impl ClusterLists {
 
     /// The rule of one cluster's list at a time.
     fn scope<'s>(&'s self, state: &'s State, receiver: usize, cluster: usize) -> Scope<'s> {
-        let entity = &state.entities[receiver];
-        Scope::new(&state.scene_bounds, receiver, entity, &self.bounds[cluster], self.near(cluster))
+        let Member { bounds, near, .. } = &self.members[cluster];
+        Scope::new(&state.scene_bounds, receiver, &state.entities[receiver], bounds, near)
     }
 
     /// The entries of clusters at the last update's time: clusters that know their place among the entries, and the
@@ -259,25 +246,23 @@ impl ClusterLists {
         let of_group = |dirty: &Dirty| {
             let group = &self.groups[dirty.group];
             let candidates = Self::candidates(now, group);
-            let mut ends = Vec::with_capacity(dirty.clusters.len());
             let mut entries = Vec::new();
-            for &cluster in &dirty.clusters {
+            let of_cluster = |&cluster: &usize| {
+                let entry_first = entries.len() as u32;
                 let sharp = gather::gather(&self.scope(now, group.receiver, cluster), &candidates, &mut entries);
-                ends.push((entries.len(), sharp as u32));
-            }
-            (ends, entries)
+                let entry_count = entries.len() as u32 - entry_first;
+                let sharp_count = sharp as u32;
+                layout::Cluster { entry_first, entry_count, sharp_count, ..self.members[cluster].cluster }
+            };
+            let clusters: Vec<layout::Cluster> = dirty.clusters.iter().map(of_cluster).collect();
+            (clusters, entries)
         };
-        let found: Vec<(Vec<(usize, u32)>, Vec<u32>)> = dirty.par_iter().map(of_group).collect();
+        let found: Vec<(Vec<layout::Cluster>, Vec<u32>)> = dirty.par_iter().map(of_group).collect();
         let mut clusters = Vec::new();
         let mut all = Vec::with_capacity(found.iter().map(|(_, s)| s.len()).sum());
-        for (dirty, (ends, entries)) in dirty.iter().zip(found) {
-            let mut start = 0;
-            for (&cluster, (end, sharp_count)) in dirty.clusters.iter().zip(ends) {
-                let entry_first = (all.len() + start) as u32;
-                let entry_count = (end - start) as u32;
-                clusters.push(layout::Cluster { entry_first, entry_count, sharp_count, ..self.clusters[cluster] });
-                start = end;
-            }
+        for (of_group, entries) in found {
+            let before = all.len() as u32;
+            clusters.extend(of_group.into_iter().map(|c| layout::Cluster { entry_first: before + c.entry_first, ..c }));
             all.extend(entries);
         }
         (self.deal(clusters), all)
@@ -319,7 +304,7 @@ impl ClusterLists {
             let is_box = |j: &u32| rests && of.boxes.contains(&(*j as usize));
             candidates.sort_by_key(|j| !is_box(j));
             let of_cluster = |cluster: usize| {
-                let scope = Scope::new(scene_bounds, receiver, entity, &self.bounds[cluster], &[]);
+                let scope = Scope::new(scene_bounds, receiver, entity, &self.members[cluster].bounds, &[]);
                 let Scope { centre, radius_m, .. } = scope;
                 let cut = if rests { Cut::default() } else { of.far.cut(centre.as_vec3(), radius_m as f32) };
                 let middle = (centre - scene_bounds.entities[receiver].centre).as_vec3();
@@ -339,7 +324,8 @@ impl ClusterLists {
         };
         let found: Vec<Vec<Sighted>> = self.groups.par_iter().map(of_group).collect();
         let found: Vec<&Sighted> = found.iter().flatten().collect();
-        let mut all = Reflected { clusters: self.deal(self.clusters.clone()), ..Reflected::default() };
+        let clusters = self.members.iter().map(|member| member.cluster).collect();
+        let mut all = Reflected { clusters: self.deal(clusters), ..Reflected::default() };
         for (number, sighted) in self.deal(found).into_iter().enumerate() {
             let Sighted { middle, cut, near, distant, boxes: [near_boxes, distant_boxes] } = sighted;
             let entry_first = all.entries.len() as u32;
@@ -379,8 +365,9 @@ impl ClusterLists {
             let candidates = Candidates::of_group(&now.scene_bounds, receiver as u32, entity, &bounds);
             let chains = |cluster: usize| {
                 let mut entries = Vec::new();
-                let bounds = around(&self.bounds[cluster]);
-                let scope = Scope::new(&now.scene_bounds, receiver, entity, &bounds, self.near(cluster));
+                let Member { bounds, near, .. } = &self.members[cluster];
+                let bounds = around(bounds);
+                let scope = Scope::new(&now.scene_bounds, receiver, entity, &bounds, near);
                 let sharp = gather::gather(&scope, &candidates, &mut entries);
                 entries.truncate(sharp);
                 let entries = without_mapped(&entries, &now.entities);
@@ -397,14 +384,11 @@ impl ClusterLists {
         let found: Vec<Vec<Vec<u32>>> = groups.par_iter().map(of_group).collect();
         let mut places = Vec::new();
         let mut all = Vec::new();
-        for entries in found.into_iter().flatten() {
-            places.push([all.len() as u32, entries.len() as u32]);
-            all.extend(entries);
-        }
         let clusters = groups.iter().flat_map(|group| group.clusters.clone());
-        for ([_, count], cluster) in places.iter_mut().zip(clusters) {
-            let differs = self.differs.get(cluster).is_some_and(|differs| *differs);
-            *count |= if differs { OWN_MAPS } else { 0 };
+        for (entries, cluster) in found.into_iter().flatten().zip(clusters) {
+            let own_maps = if self.members[cluster].differs { OWN_MAPS } else { 0 };
+            places.push([all.len() as u32, entries.len() as u32 | own_maps]);
+            all.extend(entries);
         }
         (places, all)
     }

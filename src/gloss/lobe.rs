@@ -175,18 +175,12 @@ pub fn mean_energy(roughness: f32) -> f32 {
 /// The table as texels of four numbers, [`TABLE`] wide: for each tap the rows of shift, level, weight and what is
 /// reflected by Schlick's term, then for each tap the rows of its three bands.
 pub fn texels() -> Vec<[f32; 4]> {
-    let of_taps = (0..TAPS).flat_map(|k| {
-        LOBES.iter().map(move |lobe| {
-            let Tap { shift, level, weight, .. } = lobe.taps[k];
-            [shift, level, weight, lobe.grazing].map(|x| x as f32)
-        })
-    });
-    let of_bands = (0..TAPS).flat_map(|k| {
-        LOBES.iter().map(move |lobe| {
-            let [a, b, c] = lobe.taps[k].bands.map(|x| x as f32);
-            [a, b, c, 0.0]
-        })
-    });
+    let rows = |texel: fn(&Lobe, &Tap) -> [f64; 4]| {
+        let of_tap = move |k: usize| LOBES.iter().map(move |lobe| texel(lobe, &lobe.taps[k]).map(|x| x as f32));
+        (0..TAPS).flat_map(of_tap)
+    };
+    let of_taps = rows(|lobe, tap| [tap.shift, tap.level, tap.weight, lobe.grazing]);
+    let of_bands = rows(|_, tap| [tap.bands[0], tap.bands[1], tap.bands[2], 0.0]);
     of_taps.chain(of_bands).collect()
 }
 

@@ -171,6 +171,7 @@ fn stage_flag(stage: Stage) -> vk::ShaderStageFlags {
         Stage::Compute => vk::ShaderStageFlags::COMPUTE,
         Stage::Vertex => vk::ShaderStageFlags::VERTEX,
         Stage::Fragment => vk::ShaderStageFlags::FRAGMENT,
+        other => unreachable!("no shader of stage {other:?} is in use"),
     }
 }
 

@@ -8,22 +8,7 @@ use std::path::Path;
 use std::sync::{Mutex, OnceLock, PoisonError};
 
 /// Pipeline stage of a shader, given by the file ending of its entry point.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub enum Stage {
-    Compute,
-    Vertex,
-    Fragment,
-}
-
-impl Stage {
-    fn kind(self) -> shaderc::ShaderKind {
-        match self {
-            Stage::Compute => shaderc::ShaderKind::Compute,
-            Stage::Vertex => shaderc::ShaderKind::Vertex,
-            Stage::Fragment => shaderc::ShaderKind::Fragment,
-        }
-    }
-}
+pub use shaderc::ShaderKind as Stage;
 
 /// Everything that determines the compiled SPIR-V.
 pub struct ShaderSource<'a> {
@@ -164,7 +149,7 @@ fn compile(source: &ShaderSource<'_>, includes: &BTreeMap<String, String>) -> Re
         Ok(shaderc::ResolvedInclude { resolved_name: name.to_owned(), content })
     });
     let artifact = compiler
-        .compile_into_spirv(&source.text, source.stage.kind(), source.name, "main", Some(&options))
+        .compile_into_spirv(&source.text, source.stage, source.name, "main", Some(&options))
         .map_err(|error| Error::Shader(format!("{}: {error}", source.name)))?;
     Ok(artifact.as_binary().to_vec())
 }

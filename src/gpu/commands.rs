@@ -78,20 +78,16 @@ impl<'r> Commands<'r> {
         self.in_pass = true;
         let label_name = CString::new(name).unwrap_or_default();
         let label = vk::DebugUtilsLabelEXT::default().label_name(&label_name);
-        // SAFETY: the command buffer is recording.
-        unsafe {
-            if let Some(names) = &self.recording.device.names {
-                names.cmd_begin_debug_utils_label(self.recording.buffer, &label);
-            }
+        if let Some(names) = &self.recording.device.names {
+            // SAFETY: the command buffer is recording.
+            unsafe { names.cmd_begin_debug_utils_label(self.recording.buffer, &label) };
         }
         self.stamp(2 * index);
         let outcome = record(self);
         self.stamp(2 * index + 1);
-        // SAFETY: as above.
-        unsafe {
-            if let Some(names) = &self.recording.device.names {
-                names.cmd_end_debug_utils_label(self.recording.buffer);
-            }
+        if let Some(names) = &self.recording.device.names {
+            // SAFETY: as above.
+            unsafe { names.cmd_end_debug_utils_label(self.recording.buffer) };
         }
         self.in_pass = false;
         outcome

@@ -79,7 +79,10 @@ impl<'r> Commands<'r> {
         let graphics = point == vk::PipelineBindPoint::GRAPHICS;
         let sampled = if graphics { Access::GraphicsSampled } else { Access::ComputeSampled };
         for binding in &layout.bindings {
-            let resource = resources.get(binding.index as usize).unwrap_or(&Bind::None);
+            let resource = match resources.get(binding.index as usize).unwrap_or(&Bind::None) {
+                Bind::Buffer(buffer) => &Bind::Range(buffer, buffer.all()),
+                other => other,
+            };
             let mut write = vk::WriteDescriptorSet::default()
                 .dst_set(set)
                 .dst_binding(binding.index)
@@ -89,8 +92,8 @@ impl<'r> Commands<'r> {
             let mut views = [Default::default()];
             let mut images = [Default::default()];
             match (binding.kind, resource) {
-                (Kind::STORAGE_BUFFER | Kind::UNIFORM_BUFFER, Bind::Buffer(_) | Bind::Range(..)) => {
-                    let (buffer, range) = self.buffer_range(binding, resource, &pipeline.name)?;
+                (Kind::STORAGE_BUFFER | Kind::UNIFORM_BUFFER, Bind::Range(buffer, range)) => {
+                    self.check_range(binding, buffer, range, &pipeline.name)?;
                     let size = range.end - range.start;
                     let access = if binding.writes { Access::ComputeWrite } else { Access::ComputeRead };
                     self.uses_range(buffer, range.clone(), access);
@@ -130,13 +133,8 @@ impl<'r> Commands<'r> {
         Ok(())
     }
 
-    /// The buffer and byte range of a block's resource, checked against the block and the device's limits.
-    fn buffer_range(&self, binding: &Binding, resource: &Bind<'r>, name: &str) -> Result<(&'r Buffer, Range<u64>)> {
-        let (buffer, range) = match resource {
-            Bind::Range(buffer, range) => (*buffer, range.clone()),
-            Bind::Buffer(buffer) => (*buffer, buffer.all()),
-            _ => unreachable!("only buffers have a range"),
-        };
+    /// Checks the byte range of a block's buffer against the block and the device's limits.
+    fn check_range(&self, binding: &Binding, buffer: &Buffer, range: &Range<u64>, name: &str) -> Result<()> {
         let size = range.end - range.start;
         let limits = &self.recording.device.limits;
         let (most, alignment) = if binding.kind == vk::DescriptorType::STORAGE_BUFFER {
@@ -154,7 +152,7 @@ impl<'r> Commands<'r> {
         if !range.start.is_multiple_of(alignment) {
             complain(name, binding, "the range does not start at the device's offset alignment");
         }
-        Ok((buffer, range))
+        Ok(())
     }
 
     fn descriptor_set(&mut self, layout: &Layout) -> Result<vk::DescriptorSet> {

@@ -89,7 +89,7 @@ pub fn gather(scope: &Scope<'_>, candidates: &Candidates, out: &mut Vec<u32>) ->
                     out.push(ListEntry::Globe { entity, light }.pack());
                 } else if sharp && scope.scene.is_cuboid(entity as usize) {
                     out.push(ListEntry::Cuboid { entity, light }.pack());
-                } else if view.is_sheet() {
+                } else if scope.scene.entities[entity as usize].sheet.is_some() {
                     out.push(ListEntry::Sheet { entity, light }.pack());
                 } else {
                     out.extend((view.whole || sharp).then(|| ListEntry::Occlude { entity, light }.pack()));

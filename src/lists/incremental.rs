@@ -442,7 +442,7 @@ impl<'b> Moved<'b> {
         let on = |scene: &SceneBounds| {
             // Which members are near does not matter here: those of one group move together or not at all.
             let scope = Scope::new(scene, receiver, &now.entities[receiver], bounds, &[]);
-            list.iter().any(|&j| scope.lists(j, receiver as u32))
+            list.iter().any(|&j| scope.lists(j))
         };
         on(&self.before.scene_bounds) || on(&now.scene_bounds)
     }

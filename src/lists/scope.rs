@@ -101,12 +101,6 @@ struct SheetSides {
     known: bool,
 }
 
-impl SphereView {
-    pub fn is_sheet(&self) -> bool {
-        self.sheet.is_some()
-    }
-}
-
 /// Share of the irradiance under a uniform sky that a small cap takes whose nearest point to the normal stands at this
 /// cosine, per cap of the same size at the zenith. The chain's cosine lobe has few bands and does not vanish at the
 /// horizon: it is 0.094 there with four bands (Ramamoorthi, Hanrahan 2001, section 5).
@@ -390,14 +384,14 @@ impl<'m> Scope<'m> {
     }
 
     /// Whether an entity stands on the list of the cluster.
-    pub fn lists(&self, index: usize, receiver: u32) -> bool {
+    pub fn lists(&self, index: usize) -> bool {
         let scene = self.scene;
         let occludes = scene.entities[index].occludes;
         let view = self.view_of(index);
         let blocks = |light: Option<&SphereView>, sharp, radiance: f64| {
             occludes.stands_before(sharp) && !self.is_own(index, sharp) && self.may_block(&view, light, sharp, radiance)
         };
-        let mut lights = scene.lights.iter().map(|&light| light as usize).filter(|&light| light != receiver as usize);
+        let mut lights = scene.lights.iter().map(|&light| light as usize).filter(|&light| light != self.index);
         scene.sky.is_some_and(|sky| blocks(None, false, sky))
             || lights.any(|light| {
                 let light_view = self.view(scene.spheres[light]);

@@ -97,7 +97,7 @@ fn the_tree_leaves_every_list_as_it_is() {
             // Clusters are merged again by this test.
             for j in (0..scene_bounds.entities.len()).filter(|&j| j != *receiver as usize) {
                 let on = expected.iter().any(|&entry| ListEntry::entities(entry)[0] as usize == j);
-                assert_eq!(scope.lists(j, *receiver), on, "round {round}, entity {j}");
+                assert_eq!(scope.lists(j), on, "round {round}, entity {j}");
                 assert!(!on || scope.may_list(j), "round {round}, entity {j}");
             }
         }

@@ -98,16 +98,13 @@ impl Library {
             Some("frag") => Stage::Fragment,
             _ => return Err(Error::Failed(format!("{}: not the name of an entry point", row.file))),
         };
-        let defines: Vec<(String, String)> = [
+        let of_bands = [
             ("BANDS", row.bands),
             ("COEFFICIENTS", sh::basis::coefficient_count(row.bands)),
             ("STRIDE", channel_stride(row.bands)),
-        ]
-        .into_iter()
-        .map(|(name, value)| (name.to_owned(), value.to_string()))
-        .chain(shared_macros().map(|(name, value)| (name.to_owned(), value)))
-        .chain(row.defines.iter().map(|(name, value)| ((*name).to_owned(), value.clone())))
-        .collect();
+        ];
+        let of_bands = of_bands.map(|(name, value)| (name, value.to_string()));
+        let defines = [&of_bands[..], &shared_macros(), &row.defines].concat();
         let include = |name: &str| match name.strip_prefix("generated/") {
             Some(generated) => generate(generated, row),
             None => self.text(name).ok(),

@@ -17,7 +17,7 @@ pub struct ShaderSource<'a> {
     pub stage: Stage,
     /// GLSL text of the entry point.
     pub text: String,
-    pub defines: &'a [(String, String)],
+    pub defines: &'a [(&'a str, String)],
     /// Whether shaderc inlines functions and unrolls loops, for arithmetic to be counted. Drivers do so in any case: frames
     /// are as fast, and the first picture comes a fifth sooner.
     pub optimised: bool,
@@ -180,7 +180,7 @@ mod tests {
     const TEXT: &str = "#version 460\n#include \"a.glsl\"\nlayout(local_size_x = 8) in;\n\
         layout(std430, binding = 0) buffer Out { float values[]; };\nvoid main() { values[0] = A + float(B); }\n";
 
-    fn source<'a>(include: &'a dyn Fn(&str) -> Option<String>, defines: &'a [(String, String)]) -> ShaderSource<'a> {
+    fn source<'a>(include: &'a dyn Fn(&str) -> Option<String>, defines: &'a [(&'a str, String)]) -> ShaderSource<'a> {
         ShaderSource { name: "test.comp", stage: Stage::Compute, text: TEXT.into(), defines, optimised: false, include }
     }
 
@@ -195,8 +195,8 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let one = |name: &str| (name == "a.glsl").then(|| "const float A = 1.0;\n".to_owned());
         let two = |name: &str| (name == "a.glsl").then(|| "const float A = 2.0;\n".to_owned());
-        let b = |value: &str| vec![("B".to_owned(), value.to_owned())];
-        let compile = |include: &dyn Fn(&str) -> Option<String>, defines: &[(String, String)]| {
+        let b = |value: &str| vec![("B", value.to_owned())];
+        let compile = |include: &dyn Fn(&str) -> Option<String>, defines: &[(&str, String)]| {
             from_disk(&source(include, defines), folder.path())
         };
         let first = compile(&one, &b("3"));
@@ -222,7 +222,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let include = |_: &str| Some("const float A = 1.0;\n".to_owned());
         let compile = |value: &str| {
-            let defines = [("B".to_owned(), value.to_owned())];
+            let defines = [("B", value.to_owned())];
             from_disk(&source(&include, &defines), folder.path())
         };
         let compiled = ["3", "4"].map(compile);
@@ -247,7 +247,7 @@ mod tests {
     #[test]
     fn compile_errors_carry_file_and_line() {
         let include = |_: &str| Some("const float A = nonsense;\n".to_owned());
-        let error = Shader::compile(&source(&include, &[("B".into(), "1".into())]), None).unwrap_err().to_string();
+        let error = Shader::compile(&source(&include, &[("B", "1".into())]), None).unwrap_err().to_string();
         assert!(error.contains("a.glsl:1") && error.contains("nonsense"), "{error}");
     }
 }

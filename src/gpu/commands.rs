@@ -7,7 +7,7 @@
 use super::access::{Access, Tracker};
 use super::descriptors::Bind;
 use super::device::Device;
-use super::flight::{Flight, MAX_PASSES, Recording, Signals, Timing};
+use super::flight::{Flight, MAX_PASSES, Recording, Timing};
 use super::image::Image;
 use super::memory::{Buffer, BufferKind};
 use super::pipeline::ComputePipeline;
@@ -369,7 +369,7 @@ impl<'r> Commands<'r> {
     /// Ends the recording and submits it without waiting. The recording must begin with [`Commands::after_flights`],
     /// because earlier recordings may still use its resources.
     pub fn launch(self) -> Result<Flight> {
-        self.end()?.launch(Signals::default())
+        self.end()?.launch(None, None)
     }
 
     /// Whether the caller of the library uses the queue and what is on the device too.

@@ -25,14 +25,6 @@ pub struct Timing {
     pub counted: Option<u32>,
 }
 
-#[derive(Default)]
-pub(super) struct Signals {
-    /// Colour attachments are written only after this is signalled.
-    pub wait: Option<vk::Semaphore>,
-    /// Signalled when the submission has finished.
-    pub signal: Option<vk::Semaphore>,
-}
-
 /// Command buffer, fence, timestamps and descriptor pools of one recording.
 pub(super) struct Recording {
     pub device: Arc<Device>,
@@ -116,26 +108,27 @@ impl Recording {
 
     /// Submits; the caller must wait before it releases anything that the recording uses.
     pub fn run(mut self) -> Result<Flight> {
-        self.start(&Signals::default())?;
+        self.start(None, None)?;
         Ok(Flight { recording: self, launched: false })
     }
 
-    /// Submits as one of at most [`FLIGHTS`] recordings in flight.
-    pub fn launch(mut self, signals: Signals) -> Result<Flight> {
+    /// Submits as one of at most [`FLIGHTS`] recordings in flight. Colour attachments are written only after `wait`;
+    /// `signal` is signalled when the submission has finished.
+    pub fn launch(mut self, wait: Option<vk::Semaphore>, signal: Option<vk::Semaphore>) -> Result<Flight> {
         let device = self.device.clone();
         let mut flights = device.flights();
         assert!(flights.len() < FLIGHTS, "{}: {} recordings are already in flight", self.name, flights.len());
-        self.start(&signals)?;
+        self.start(wait, signal)?;
         flights.push(self.fence);
         Ok(Flight { recording: self, launched: true })
     }
 
-    fn start(&mut self, signals: &Signals) -> Result<()> {
+    fn start(&mut self, wait: Option<vk::Semaphore>, signal: Option<vk::Semaphore>) -> Result<()> {
         let handle = &self.device.handle;
         let stage = vk::PipelineStageFlags2::COLOR_ATTACHMENT_OUTPUT;
-        let wait = signals.wait.map(|s| vk::SemaphoreSubmitInfo::default().semaphore(s).stage_mask(stage));
+        let wait = wait.map(|s| vk::SemaphoreSubmitInfo::default().semaphore(s).stage_mask(stage));
         let all = vk::PipelineStageFlags2::ALL_COMMANDS;
-        let signal = signals.signal.map(|s| vk::SemaphoreSubmitInfo::default().semaphore(s).stage_mask(all));
+        let signal = signal.map(|s| vk::SemaphoreSubmitInfo::default().semaphore(s).stage_mask(all));
         let buffers = [vk::CommandBufferSubmitInfo::default().command_buffer(self.buffer)];
         let submit = [vk::SubmitInfo2::default()
             .command_buffer_infos(&buffers)

@@ -1,7 +1,7 @@
 //! Surface and swapchain of a window; the swapchain is rebuilt when it no longer fits the window.
 
 use super::device::{Device, DeviceOptions};
-use super::flight::{FLIGHTS, Flight, Signals};
+use super::flight::{FLIGHTS, Flight};
 use super::image::{Image, ImageShape, encodes_srgb};
 use super::owned::Owned;
 use super::{Checked, Commands};
@@ -252,7 +252,7 @@ impl Window {
         let chain = self.chain.as_ref().expect("a shot is presented before the window changes");
         assert!(Arc::ptr_eq(&chain.images[shot.index as usize], &shot.image), "a shot of another swapchain");
         let drawn = chain.drawn[shot.index as usize].handle;
-        let flight = commands.end()?.launch(Signals { wait: Some(shot.acquired), signal: Some(drawn) })?;
+        let flight = commands.end()?.launch(Some(shot.acquired), Some(drawn))?;
         let semaphores = [drawn];
         let swapchains = [chain.handle.handle];
         let indices = [shot.index];

@@ -217,11 +217,9 @@ impl SceneBuffers {
         let surfaces = surfaces.map(|(index, surface)| packing.add(device, surface, by_triangles(index)));
         let surfaces = surfaces.collect::<Result<_>>()?;
         let Packing { vertices, mut transfers, mut self_cells, .. } = packing;
-        self_cells.resize(self_cells.len().max(2), [0; 2]);
         // A buffer may not be empty.
-        if transfers.is_empty() {
-            transfers.resize(4, 0.0);
-        }
+        self_cells.resize(self_cells.len().max(2), [0; 2]);
+        transfers.resize(transfers.len().max(4), 0.0);
         Ok(SceneBuffers {
             fields,
             silhouettes,

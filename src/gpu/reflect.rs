@@ -165,7 +165,8 @@ impl<'m> Reader<'m> {
 
     fn binding(&self, variable: u32, target: u32, class: StorageClass) -> Result<Binding> {
         let definition = self.definitions[&target];
-        let name = self.variable_name(variable);
+        let own_name = self.name(variable);
+        let name = if own_name.is_empty() { self.name(target) } else { own_name }.to_owned();
         let set = self.decoration(variable, None, Decoration::DescriptorSet).unwrap_or(0);
         if set != 0 {
             return Err(Error::Failed(format!("{name} is in descriptor set {set}; all bindings are in set 0")));
@@ -206,19 +207,8 @@ impl<'m> Reader<'m> {
         }
     }
 
-    /// Name of a variable, or of its block where it has none.
-    pub(super) fn variable_name(&self, variable: u32) -> String {
-        let own = self.name(variable);
-        if !own.is_empty() {
-            return own.to_owned();
-        }
-        let pointer = self.definitions.get(&variable).and_then(|i| i.result_type);
-        let target = pointer.and_then(|p| self.definitions.get(&p)).map(|p| id(&p.operands[1]));
-        target.map_or_else(String::new, |target| self.name(target).to_owned())
-    }
-
     /// Bytes of a type; a runtime array counts as 0.
-    pub(super) fn size_bytes(&self, of: u32) -> u32 {
+    fn size_bytes(&self, of: u32) -> u32 {
         let definition = self.definitions[&of];
         let operands = &definition.operands;
         match definition.class.opcode {

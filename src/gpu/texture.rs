@@ -40,7 +40,23 @@ impl Texture {
         let shape = ImageShape { format, width: first.width, height: first.height, samples: 1 };
         let mipmaps = vk::SamplerMipmapMode::NEAREST;
         let texture = Self::empty(device, name, shape, levels.len() as u32, wrap, mipmaps)?;
-        texture.fill(device, name, levels)?;
+        let bytes: Vec<u8> = levels.iter().flat_map(|level| level.bytes).copied().collect();
+        let mut staging = Buffer::new(device, name, BufferKind::Upload, bytes.len() as u64)?;
+        staging.write(0, &bytes);
+        let mut offset = 0;
+        let mut regions = Vec::with_capacity(levels.len());
+        for (number, level) in levels.iter().enumerate() {
+            let extent = vk::Extent3D { width: level.width, height: level.height, depth: 1 };
+            let mut region = packed(&texture.image).buffer_offset(offset).image_extent(extent);
+            region.image_subresource.mip_level = number as u32;
+            regions.push(region);
+            offset += level.bytes.len() as u64;
+        }
+        let mut commands = Commands::new(device, name)?;
+        commands.image_barrier(&texture.image, None, Access::TransferWrite);
+        commands.copy_regions(&staging, &texture.image, &regions);
+        commands.image_barrier(&texture.image, Some(Access::TransferWrite), Access::GraphicsSampled);
+        commands.submit()?;
         Ok(texture)
     }
 
@@ -85,27 +101,6 @@ impl Texture {
         let sampler = unsafe { device.handle.create_sampler(&sampler, None) }.checked("vkCreateSampler", name)?;
         let sampler = Owned::new(device, name, sampler, ash::Device::destroy_sampler);
         Ok(Texture { sampler, image })
-    }
-
-    /// Copies the levels and leaves the image ready to be sampled.
-    fn fill(&self, device: &Arc<Device>, name: &str, levels: &[Level<'_>]) -> Result<()> {
-        let bytes: Vec<u8> = levels.iter().flat_map(|level| level.bytes).copied().collect();
-        let mut staging = Buffer::new(device, name, BufferKind::Upload, bytes.len() as u64)?;
-        staging.write(0, &bytes);
-        let mut offset = 0;
-        let mut regions = Vec::with_capacity(levels.len());
-        for (number, level) in levels.iter().enumerate() {
-            let extent = vk::Extent3D { width: level.width, height: level.height, depth: 1 };
-            let mut region = packed(&self.image).buffer_offset(offset).image_extent(extent);
-            region.image_subresource.mip_level = number as u32;
-            regions.push(region);
-            offset += level.bytes.len() as u64;
-        }
-        let mut commands = Commands::new(device, name)?;
-        commands.image_barrier(&self.image, None, Access::TransferWrite);
-        commands.copy_regions(&staging, &self.image, &regions);
-        commands.image_barrier(&self.image, Some(Access::TransferWrite), Access::GraphicsSampled);
-        commands.submit().map(|_| ())
     }
 
     pub(super) fn descriptor(&self) -> vk::DescriptorImageInfo {

@@ -10,7 +10,7 @@ use crate::draw::smooth::Strips;
 use crate::error::Result;
 use crate::gpu::{Device, TexelView, Upload};
 use crate::layout::{self, CLUSTER_FORMAT, ENTRY_FORMAT};
-use crate::lists::incremental::{ClusterLists, Dirty, Merged};
+use crate::lists::incremental::{ClusterLists, Merged};
 use crate::merge::Merge;
 use crate::merge::variant::{MergePermutation, Reads};
 use crate::scene::Placement;
@@ -96,7 +96,7 @@ impl Frame {
         let (clusters, entries) = work.lists.gather(&dirty);
         work.merged = Merged {
             clusters: work.lists.members.len(),
-            merged_clusters: dirty.iter().map(Dirty::cluster_count).sum(),
+            merged_clusters: dirty.iter().map(|dirty| dirty.clusters.len()).sum(),
             merged_entries: entries.len(),
         };
         if dirty.is_empty() {

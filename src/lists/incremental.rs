@@ -34,13 +34,7 @@ struct WatchedGroup {
 /// Clusters of one group that are to be merged.
 pub(crate) struct Dirty {
     group: usize,
-    clusters: Vec<usize>,
-}
-
-impl Dirty {
-    pub fn cluster_count(&self) -> usize {
-        self.clusters.len()
-    }
+    pub clusters: Vec<usize>,
 }
 
 pub(crate) struct Member {

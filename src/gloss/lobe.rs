@@ -124,11 +124,6 @@ impl Lobe {
     }
 }
 
-/// The roughness of a row of the table.
-fn row_roughness(row: usize) -> f64 {
-    row as f64 / (TABLE - 1) as f64
-}
-
 /// The cosine of a column: dense where the view grazes.
 fn column_cosine(column: usize) -> f64 {
     let root = column as f64 / (TABLE - 1) as f64;
@@ -137,7 +132,8 @@ fn column_cosine(column: usize) -> f64 {
 
 /// All entries, roughness by roughness.
 static LOBES: LazyLock<Vec<Lobe>> = LazyLock::new(|| {
-    (0..TABLE * TABLE).into_par_iter().map(|i| Lobe::new(row_roughness(i / TABLE), column_cosine(i % TABLE))).collect()
+    let entry = |i: usize| Lobe::new((i / TABLE) as f64 / (TABLE - 1) as f64, column_cosine(i % TABLE));
+    (0..TABLE * TABLE).into_par_iter().map(entry).collect()
 });
 
 /// What the lobe of a roughness reflects of unit light from everywhere, seen at a cosine to the normal; interpolated as

@@ -337,7 +337,12 @@ fn vertex_layout(
     let attribute = |i: &VertexInput| vk::VertexInputAttributeDescription {
         location: i.location,
         binding: i.location,
-        format: attribute_format(i.components),
+        format: match i.components {
+            1 => vk::Format::R32_SFLOAT,
+            2 => vk::Format::R32G32_SFLOAT,
+            3 => vk::Format::R32G32B32_SFLOAT,
+            _ => vk::Format::R32G32B32A32_SFLOAT,
+        },
         offset: 0,
     };
     (inputs.iter().map(binding).collect(), inputs.iter().map(attribute).collect())
@@ -356,13 +361,4 @@ fn color_blend(keeps: Keeps) -> vk::PipelineColorBlendAttachmentState {
         .dst_color_blend_factor(vk::BlendFactor::ONE_MINUS_SRC_ALPHA)
         .src_alpha_blend_factor(vk::BlendFactor::ONE)
         .dst_alpha_blend_factor(vk::BlendFactor::ONE_MINUS_SRC_ALPHA)
-}
-
-fn attribute_format(components: u32) -> vk::Format {
-    match components {
-        1 => vk::Format::R32_SFLOAT,
-        2 => vk::Format::R32G32_SFLOAT,
-        3 => vk::Format::R32G32B32_SFLOAT,
-        _ => vk::Format::R32G32B32A32_SFLOAT,
-    }
 }

@@ -10,7 +10,7 @@ use crate::gpu::{self, Device, PresentMode, Window, display, process};
 use crate::scene::Scene;
 use crate::view::command::Command;
 use crate::view::editor::add_sky;
-use crate::view::input::{Button, Event, Key};
+use crate::view::input::{Event, Key};
 use crate::view::{Editor, FrameTarget, Setup, Viewer};
 use clap::Args;
 use raw_window_handle::HasDisplayHandle;
@@ -21,7 +21,7 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 use winit::application::ApplicationHandler;
 use winit::dpi::PhysicalSize;
-use winit::event::{ElementState, KeyEvent, MouseButton, MouseScrollDelta, WindowEvent};
+use winit::event::{ElementState, KeyEvent, MouseScrollDelta, WindowEvent};
 use winit::event_loop::{ActiveEventLoop, ControlFlow, EventLoop};
 use winit::keyboard::{Key as Logical, ModifiersState, NamedKey};
 use winit::window::WindowId;
@@ -353,11 +353,11 @@ impl Shown {
             }
             // A dragged entity is released wherever the pointer is.
             WindowEvent::MouseInput { state: ElementState::Released, button, .. } => {
-                button_of(*button).map_or(Ok(()), |button| self.viewer.event(Event::Release(button)))
+                self.viewer.event(Event::Release(*button))
             }
             _ if response.consumed => Ok(()),
             WindowEvent::MouseInput { state: ElementState::Pressed, button, .. } => {
-                button_of(*button).map_or(Ok(()), |button| self.viewer.event(Event::Press(button, self.pointer)))
+                self.viewer.event(Event::Press(*button, self.pointer))
             }
             WindowEvent::MouseWheel { delta, .. } => {
                 let notches = match delta {
@@ -390,26 +390,14 @@ impl Shown {
     }
 }
 
-fn button_of(button: MouseButton) -> Option<Button> {
-    match button {
-        MouseButton::Left => Some(Button::Left),
-        MouseButton::Right => Some(Button::Right),
-        MouseButton::Middle => Some(Button::Middle),
-        _ => None,
-    }
-}
-
 fn key_of(event: &KeyEvent) -> Option<Key> {
     match &event.logical_key {
         Logical::Named(NamedKey::Space) => Some(Key::Space),
         Logical::Named(NamedKey::Escape) => Some(Key::Escape),
         Logical::Named(NamedKey::Home) => Some(Key::Home),
-        Logical::Named(NamedKey::F1) => Some(Key::Function(1)),
-        Logical::Named(NamedKey::F12) => Some(Key::Function(12)),
-        Logical::Character(text) => {
-            let letter = text.chars().next().filter(char::is_ascii_alphabetic)?;
-            Some(Key::Letter(letter.to_ascii_lowercase()))
-        }
+        Logical::Named(NamedKey::F1) => Some(Key::F1),
+        Logical::Named(NamedKey::F12) => Some(Key::F12),
+        Logical::Character(text) => Key::from_name(text),
         _ => None,
     }
 }

@@ -1,28 +1,13 @@
-//! Maps keys and pointer events to commands, independent of the window library, and lists them as help.
+//! Maps keys and pointer events to commands, independent of a window, and lists them as help.
 
 use super::command::Command;
 use super::editor::Editor;
+pub use egui::Key;
 use std::fmt::Write;
+pub use winit::event::MouseButton as Button;
 
 /// A press is a click if the pointer moves less than this, in pixels of a 96 dpi screen.
 const CLICK_SLACK_PX: f32 = 4.0;
-
-/// A key, named by what it types without Shift.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub enum Key {
-    Letter(char),
-    Space,
-    Escape,
-    Home,
-    Function(u8),
-}
-
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Button {
-    Left,
-    Right,
-    Middle,
-}
 
 /// An event of the window. Positions are in pixels of the window, x to the right, y down; the edited picture is at its
 /// left.
@@ -53,10 +38,6 @@ pub struct KeyHelp {
     pub bindings: &'static [(Key, bool, Command)],
 }
 
-const fn letter(key: char, command: Command) -> (Key, bool, Command) {
-    (Key::Letter(key), false, command)
-}
-
 const fn row(keys: &'static str, what: &'static str, bindings: &'static [(Key, bool, Command)]) -> KeyHelp {
     KeyHelp { keys, what, bindings }
 }
@@ -71,26 +52,26 @@ pub const CONTROLS: &[KeyHelp] = &[
     row(
         "Q / A",
         "select the next, the previous",
-        &[letter('q', Command::SelectNext), letter('a', Command::SelectPrevious)],
+        &[(Key::Q, false, Command::SelectNext), (Key::A, false, Command::SelectPrevious)],
     ),
     row("Esc", "select nothing", &[(Key::Escape, false, Command::SelectNone)]),
     row("drag the selected", "move it in the ground plane", &[]),
-    row("E", "turn an occluder into a light and back", &[letter('e', Command::ToggleLight)]),
+    row("E", "turn an occluder into a light and back", &[(Key::E, false, Command::ToggleLight)]),
     row("Space", "run, pause", &[(Key::Space, false, Command::ToggleRunning)]),
-    row("Z", "next demo scene", &[letter('z', Command::NextScene)]),
-    row("G", "ray-cast reference on the right", &[letter('g', Command::ToggleReference)]),
-    row("X", "error in false colour", &[letter('x', Command::ToggleError)]),
-    row("F12", "write PNG and EXR", &[(Key::Function(12), false, Command::Screenshot)]),
-    row("Ctrl-S", "save as NAME-edited.toml (then NAME-edited-2.toml)", &[(Key::Letter('s'), true, Command::Save)]),
+    row("Z", "next demo scene", &[(Key::Z, false, Command::NextScene)]),
+    row("G", "ray-cast reference on the right", &[(Key::G, false, Command::ToggleReference)]),
+    row("X", "error in false colour", &[(Key::X, false, Command::ToggleError)]),
+    row("F12", "write PNG and EXR", &[(Key::F12, false, Command::Screenshot)]),
+    row("Ctrl-S", "save as NAME-edited.toml (then NAME-edited-2.toml)", &[(Key::S, true, Command::Save)]),
     row(
         "Ctrl-Z / Ctrl-Y",
         "undo, redo",
-        &[(Key::Letter('z'), true, Command::Undo), (Key::Letter('y'), true, Command::Redo)],
+        &[(Key::Z, true, Command::Undo), (Key::Y, true, Command::Redo)],
     ),
     row("drop a file", "open a scene, a glTF or an OBJ file", &[]),
-    row("F1", "fold, unfold this list", &[(Key::Function(1), false, Command::ToggleKeys)]),
-    row("H", "hide, show all panels", &[letter('h', Command::ToggleOverlay)]),
-    row("Ctrl-Q", "close", &[(Key::Letter('q'), true, Command::Quit)]),
+    row("F1", "fold, unfold this list", &[(Key::F1, false, Command::ToggleKeys)]),
+    row("H", "hide, show all panels", &[(Key::H, false, Command::ToggleOverlay)]),
+    row("Ctrl-Q", "close", &[(Key::Q, true, Command::Quit)]),
 ];
 
 /// The controls as text, one line each, for `--help` and README.
@@ -143,7 +124,7 @@ impl Input {
     pub fn commands(&mut self, event: Event, editor: &Editor) -> Vec<Command> {
         match event {
             Event::Key { key, control, repeat } => of_key(key, control, repeat).into_iter().collect(),
-            Event::Press(button, at) => {
+            Event::Press(button @ (Button::Left | Button::Right | Button::Middle), at) => {
                 let out = self.let_go();
                 // The reference beside the picture has the same camera, so positions in it are used as positions in the
                 // picture.
@@ -153,7 +134,7 @@ impl Input {
                 let held = match button {
                     Button::Left if editor.grabs(at) => Held::Grab,
                     Button::Left => Held::Turn,
-                    Button::Right | Button::Middle => Held::Pan,
+                    _ => Held::Pan,
                 };
                 self.drag = Some(PointerDrag { button, held, start: at, last: at, left, moved: false });
                 out
@@ -165,7 +146,7 @@ impl Input {
                 out.extend(click.map(|drag| Command::Pick(drag.start)));
                 out
             }
-            Event::Release(_) => Vec::new(),
+            Event::Press(..) | Event::Release(_) => Vec::new(),
             Event::Wheel(notches) => vec![Command::Zoom(notches)],
             Event::Lost => self.let_go(),
         }

@@ -10,23 +10,22 @@ fn every_control_has_its_command() {
     let editor = from_text(SMALL);
     let mut input = Input::new(1.0);
     let mut key = |key, control, repeat| input.commands(Event::Key { key, control, repeat }, &editor);
-    let letter = |c| Key::Letter(c);
     for (k, control, expected) in [
-        (letter('q'), false, Command::SelectNext),
-        (letter('a'), false, Command::SelectPrevious),
+        (Key::Q, false, Command::SelectNext),
+        (Key::A, false, Command::SelectPrevious),
         (Key::Escape, false, Command::SelectNone),
-        (letter('e'), false, Command::ToggleLight),
-        (letter('z'), false, Command::NextScene),
-        (letter('z'), true, Command::Undo),
-        (letter('y'), true, Command::Redo),
-        (letter('s'), true, Command::Save),
-        (letter('q'), true, Command::Quit),
+        (Key::E, false, Command::ToggleLight),
+        (Key::Z, false, Command::NextScene),
+        (Key::Z, true, Command::Undo),
+        (Key::Y, true, Command::Redo),
+        (Key::S, true, Command::Save),
+        (Key::Q, true, Command::Quit),
         (Key::Space, false, Command::ToggleRunning),
-        (letter('g'), false, Command::ToggleReference),
-        (letter('x'), false, Command::ToggleError),
-        (letter('h'), false, Command::ToggleOverlay),
-        (Key::Function(1), false, Command::ToggleKeys),
-        (Key::Function(12), false, Command::Screenshot),
+        (Key::G, false, Command::ToggleReference),
+        (Key::X, false, Command::ToggleError),
+        (Key::H, false, Command::ToggleOverlay),
+        (Key::F1, false, Command::ToggleKeys),
+        (Key::F12, false, Command::Screenshot),
         (Key::Home, false, Command::Home),
     ] {
         assert_eq!(key(k, control, false), [expected], "{k:?}");
@@ -39,10 +38,10 @@ fn every_control_has_its_command() {
             _ => assert_eq!(repeated, []),
         }
     }
-    for unbound in [letter('w'), letter('5'), Key::Function(3)] {
+    for unbound in [Key::W, Key::Num5, Key::F3] {
         assert_eq!(key(unbound, false, false), []);
     }
-    assert_eq!(key(letter('s'), false, false), [], "s alone does not save");
+    assert_eq!(key(Key::S, false, false), [], "s alone does not save");
     // Every row of the help is one line, short enough for the overlay.
     let text = help();
     assert_eq!(text.lines().count(), CONTROLS.len());

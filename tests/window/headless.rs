@@ -66,15 +66,15 @@ fn what_is_shown_is_what_render_makes_of_the_state() {
 
     // Back as it was, step by step.
     while stand.viewer.editor.undo_count() > 0 {
-        stand.viewer.event(Event::Key { key: Key::Letter('z'), control: true, repeat: false }).unwrap();
+        stand.viewer.event(Event::Key { key: Key::Z, control: true, repeat: false }).unwrap();
         stand.turn();
     }
     stand.ready();
     let shown = as_rendered(&mut stand, "after undoing everything");
 
     // The saved file and the picture files.
-    stand.viewer.event(Event::Key { key: Key::Letter('s'), control: true, repeat: false }).unwrap();
-    stand.key(Key::Function(12));
+    stand.viewer.event(Event::Key { key: Key::S, control: true, repeat: false }).unwrap();
+    stand.key(Key::F12);
     let written = |ending: &str| {
         let mut files = std::fs::read_dir(&stand.cache).unwrap().map(|f| f.unwrap().path());
         files.find(|f| f.extension().is_some_and(|e| e == ending) && !f.ends_with("scene.toml")).unwrap()

@@ -115,7 +115,7 @@ impl Stand {
     }
 
     pub fn letter(&mut self, letter: char) {
-        self.key(Key::Letter(letter));
+        self.key(Key::from_name(&letter.to_string()).expect("a letter's key"));
     }
 
     pub fn drag(&mut self, button: Button, from: [f32; 2], to: [f32; 2]) {

@@ -121,7 +121,7 @@ fn close(shown: Option<Shown>, outcome: Result<()>) -> Result<()> {
     let Some(mut shown) = shown else { return outcome };
     // A device that was lost would be waited for in vain.
     let outcome = outcome.and_then(|()| shown.viewer.settle());
-    outcome.map_err(|error| shown.viewer.rescued(error))
+    outcome.map_err(|error| shown.viewer.editor.rescued(error))
 }
 
 /// Ends the window whose display is lost. What belongs to it is left to the end of the process, since its calls would
@@ -131,7 +131,7 @@ fn close_lost(shown: Option<Shown>, display: impl Sized) -> Result<()> {
     let _display = ManuallyDrop::new(display);
     let error = display::lost();
     Err(match &mut *shown {
-        Some(shown) => shown.viewer.rescued(error),
+        Some(shown) => shown.viewer.editor.rescued(error),
         None => error,
     })
 }
@@ -181,10 +181,8 @@ struct Shown {
     pointer: [f32; 2],
     updated: Instant,
     opened: Instant,
-    /// Nothing could be drawn the last time.
-    hidden: bool,
-    /// When it was tried.
-    tried: Instant,
+    /// When nothing could be drawn, if that was the last time.
+    hidden: Option<Instant>,
 }
 
 struct App<'a> {
@@ -249,8 +247,7 @@ impl App<'_> {
             pointer: [0.0; 2],
             updated: Instant::now(),
             opened: Instant::now(),
-            hidden: false,
-            tried: Instant::now(),
+            hidden: None,
         })
     }
 
@@ -286,8 +283,8 @@ impl ApplicationHandler for App<'_> {
         let now = Instant::now();
         let passed = now.duration_since(std::mem::replace(&mut shown.updated, now));
         let outcome = shown.viewer.update(passed.as_secs_f64());
-        let flow = if shown.hidden {
-            if shown.tried.elapsed() >= HIDDEN_PERIOD {
+        let flow = if let Some(tried) = shown.hidden {
+            if tried.elapsed() >= HIDDEN_PERIOD {
                 shown.window.request_redraw();
             }
             ControlFlow::WaitUntil(now + HIDDEN_PERIOD)
@@ -306,7 +303,7 @@ impl Shown {
     /// egui's input, as `take_egui_input` gives it. That panics where another program has just destroyed the window.
     fn input(&mut self) -> egui::RawInput {
         let scale = egui_winit::pixels_per_point(&self.viewer.egui, &self.window);
-        let [width, height] = self.viewer.size().map(|side| side as f32 / scale);
+        let [width, height] = self.viewer.editor.window().map(|side| side as f32 / scale);
         let input = self.egui.egui_input_mut();
         input.time = Some(self.opened.elapsed().as_secs_f64());
         input.screen_rect = Some(egui::Rect::from_min_size(egui::Pos2::ZERO, egui::vec2(width, height)));
@@ -330,13 +327,13 @@ impl Shown {
             WindowEvent::Destroyed => Err(Error::Device("another program destroyed the window".into())),
             WindowEvent::Resized(size) => {
                 log::info!("resized to {}x{}", size.width, size.height);
-                self.hidden = false;
+                self.hidden = None;
                 self.target.resize((*size).into());
                 self.viewer.apply(Command::Resize((*size).into()))
             }
             WindowEvent::Occluded(occluded) => {
                 log::info!("occluded: {occluded}");
-                self.hidden &= occluded;
+                self.hidden = self.hidden.filter(|_| *occluded);
                 Ok(())
             }
             WindowEvent::ModifiersChanged(modifiers) => {
@@ -385,7 +382,7 @@ impl Shown {
             self.titled = scene.to_owned();
         }
         let drawn = self.viewer.draw(FrameTarget::Window(&mut self.target))?;
-        (self.hidden, self.tried) = (!drawn, Instant::now());
+        self.hidden = (!drawn).then(Instant::now);
         Ok(())
     }
 }

@@ -1,7 +1,6 @@
 //! The viewer's ray-cast reference, which a background task casts, first coarsely, then more finely while nothing
 //! changes; and the error of the merge against it.
 
-use super::command::Changed;
 use super::panel::ErrorScale;
 use super::task::{BackgroundTask, TaskWorker};
 use super::viewer::{ERROR, REFERENCE, Viewer};
@@ -40,10 +39,10 @@ impl Viewer {
             let frame = self.frame.as_mut().expect("checked above");
             frame.set_comparison(REFERENCE, &found.radiosity, [0.0; 3])?;
             self.reference = Some(found);
-            self.pending |= Changed { display: true, ..Changed::default() };
+            self.pending.display = true;
         }
-        if let Some(Err(error)) = self.rays.as_mut().and_then(BackgroundTask::ended) {
-            self.tolerate(Err::<(), _>(error)).map(|_| ())?;
+        if let Some(ended) = self.rays.as_mut().and_then(BackgroundTask::ended) {
+            self.tolerate(ended)?;
         }
         let current = self.reference.as_ref().is_some_and(|r| r.version == self.version);
         // Rays for an outdated state end after their first round, so that a coarse reference is visible while entities
@@ -74,7 +73,7 @@ impl Viewer {
         frame.set_comparison(ERROR, &map.colors(&scale), NEUTRAL)?;
         let shown = ErrorScale { rms: map.rms(), limit: scale.limit };
         self.error_shown = Some((self.version, reference.rays, shown));
-        self.pending |= Changed { display: true, ..Changed::default() };
+        self.pending.display = true;
         Ok(())
     }
 }
@@ -82,27 +81,17 @@ impl Viewer {
 fn cast(scene: Scene, placements: Vec<Placement>, version: u64, seed: u64) -> BackgroundTask<Reference> {
     BackgroundTask::new(move |worker: &TaskWorker<Reference>| {
         let world = World::of(&scene, &placements);
+        let vertices = receiver_vertices(&scene);
         for rays in ROUNDS {
-            let rays = RayCast { rays, runs: RUNS, seed, ..RayCast::default() };
-            worker.send(round(&scene, &world, rays, version, worker)?);
+            let cast = RayCast { rays, runs: RUNS, seed, ..RayCast::default() };
+            let mut lit = Vec::with_capacity(vertices.len());
+            for chunk in vertices.chunks(CHUNK) {
+                worker.report(&format!("{rays} rays a vertex"), lit.len() as u32, vertices.len() as u32);
+                lit.extend(cast.run(&world, chunk));
+            }
+            let radiosity = by_entity(&vertices, &lit);
+            worker.send(Reference { version, rays, error: raycast::relative_error(&lit), radiosity });
         }
         Ok(())
     })
-}
-
-fn round(
-    scene: &Scene,
-    world: &World<'_>,
-    cast: RayCast,
-    version: u64,
-    worker: &TaskWorker<Reference>,
-) -> Result<Reference> {
-    let vertices = receiver_vertices(scene);
-    let mut lit = Vec::with_capacity(vertices.len());
-    for chunk in vertices.chunks(CHUNK) {
-        worker.report(&format!("{} rays a vertex", cast.rays), lit.len() as u32, vertices.len() as u32);
-        lit.extend(cast.run(world, chunk));
-    }
-    let radiosity = by_entity(&vertices, &lit);
-    Ok(Reference { version, rays: cast.rays, error: raycast::relative_error(&lit), radiosity })
 }

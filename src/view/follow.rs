@@ -158,7 +158,7 @@ impl Viewer {
             return Ok(());
         }
         self.previewed = if is_lit { Previewed::Light } else { Previewed::Shapes };
-        let options = frame::Options { size: self.size(), ..self.setup.frame };
+        let options = frame::Options { size: self.editor.window(), ..self.setup.frame };
         let make = if is_lit { lit } else { shapes };
         let preview = make(&self.baker, &self.setup.cache, &self.editor, options);
         self.settle()?;
@@ -171,7 +171,12 @@ impl Viewer {
         let built = self.new_frame();
         if let Some(frame) = self.tolerate(built)? {
             log::info!("ready: the first picture of {}", self.editor.path().display());
-            self.take(frame);
+            self.frame = Some(frame);
+            self.preview = None;
+            self.build_count += 1;
+            self.drawn_before = Some(self.frame_count);
+            self.pending |= Changed { placements: true, camera: true, ..Changed::default() };
+            self.version += 1;
         }
         Ok(())
     }
@@ -179,17 +184,8 @@ impl Viewer {
     /// A frame of the scene, whose fields are cached.
     fn new_frame(&mut self) -> Result<Frame> {
         self.settle()?;
-        let options = frame::Options { size: self.size(), ..self.setup.frame };
+        let options = frame::Options { size: self.editor.window(), ..self.setup.frame };
         Frame::new(&self.baker, &self.setup.cache, self.editor.scene(), options, &|_, _, _| ())
-    }
-
-    fn take(&mut self, frame: Frame) {
-        self.frame = Some(frame);
-        self.preview = None;
-        self.build_count += 1;
-        self.drawn_before = Some(self.frame_count);
-        self.pending |= Changed { placements: true, camera: true, ..Changed::default() };
-        self.version += 1;
     }
 
     /// Decides whether the next picture is refined; `moves` if it differs from the last in more than the overlay.

@@ -174,15 +174,6 @@ impl Viewer {
         Ok(viewer)
     }
 
-    pub fn rescued(&mut self, error: Error) -> Error {
-        self.editor.rescued(error)
-    }
-
-    /// Width and height of the window's picture, pixels.
-    pub fn size(&self) -> [u32; 2] {
-        self.editor.window()
-    }
-
     /// Whether the pointer drags the scene or an entity.
     pub fn is_dragging(&self) -> bool {
         self.input.is_dragging()
@@ -282,9 +273,8 @@ impl Viewer {
         }
         if let Some(ended) = self.bake.as_mut().and_then(BackgroundTask::ended) {
             self.bake = None;
-            match ended {
-                Ok(()) => self.build()?,
-                Err(error) => self.tolerate(Err::<(), _>(error)).map(|_| ())?,
+            if self.tolerate(ended)?.is_some() {
+                self.build()?;
             }
         }
         self.preview()?;
@@ -321,7 +311,7 @@ impl Viewer {
             return Err(Error::input(path, format!("--strict: {}", left_out.join("; "))));
         }
         add_sky(&mut scene);
-        let [width, height] = self.size().map(f64::from);
+        let [width, height] = self.editor.window().map(f64::from);
         scene.fit_added_camera(width / height);
         let time_s = scene.data.output.time_s;
         let exposed = exposure::settle(&mut scene, time_s, width / height);
@@ -368,7 +358,7 @@ impl Viewer {
         Status {
             device: &info.name,
             driver: &info.driver,
-            size: self.size(),
+            size: self.editor.window(),
             refined: self.setup.refines.then(|| self.is_refined()),
             timings: &self.timings,
             vertices: self.frame.as_ref().map(Frame::receiver_vertex_count),
@@ -405,7 +395,7 @@ impl Viewer {
     fn add(&mut self, text: String, insists: bool) {
         log::info!("message: {text}");
         self.messages.push_back(Message { since: Instant::now(), text, insists });
-        self.pending |= Changed { display: true, ..Changed::default() };
+        self.pending.display = true;
     }
 
     /// Returns `Device` and `Unsupported` errors; all other errors become messages.

@@ -46,9 +46,6 @@ pub fn texel_index(capture: &Capture, slot: u32, x: usize, y: usize) -> usize {
     (row * px + y) * columns * px + column * px + x
 }
 
-/// Texels of one eye's faces in rows; `None` where the face was not drawn.
-pub type CapturedFaces<T> = [Option<Vec<T>>; FACE_COUNT];
-
 /// Captures of a mesh in faces of `face_px`. Backs of triangles are left out of a closed mesh where `cull` is set.
 pub fn capture_of(
     baker: &Baker,
@@ -69,14 +66,14 @@ pub fn only_batch(capture: &Capture, eyes: &[Vec3]) -> Vec<Slots> {
     batches.remove(0)
 }
 
-/// Captures every eye's faces.
+/// The texels of every eye's faces in rows; `None` where a face was not drawn.
 pub fn faces<T: Pod>(
     baker: &Baker,
     mesh: &Mesh,
     eyes: &[Vec3],
     settings: (u32, FieldKind, bool),
     way: Way,
-) -> Result<Vec<CapturedFaces<T>>> {
+) -> Result<Vec<[Option<Vec<T>>; FACE_COUNT]>> {
     let capture = capture_of(baker, mesh, settings, way)?;
     let batch = only_batch(&capture, eyes);
     let atlas: Vec<T> = atlas(baker.device(), &capture, eyes, &batch)?;

@@ -11,14 +11,14 @@ use crate::frame::{self, Frame};
 use crate::scene::Placement;
 
 /// Two half-float steps, and two roundings of interpolated f32.
-pub const HALF: f64 = 2e-3;
+const HALF: f64 = 2e-3;
 /// Share of pixels whose samples may lie so near an edge that device and rays see different triangles there, or so
 /// shifted a gradient: where corners snap to 1/256 of a pixel, and in proportion to that step on other devices.
 const EDGES: f64 = 2e-3;
 
 /// Draws what the last merge left, on the device and by its twin: the share of pixels that differ by more than [`HALF`]
 /// of 1 + what is wanted. Infinite where the picture is of one colour.
-pub fn against_twin(frame: &mut Frame, placements: &[Placement], white: f32) -> Result<f64> {
+fn against_twin(frame: &mut Frame, placements: &[Placement], white: f32) -> Result<f64> {
     frame.render(placements, Some(white))?;
     let found = frame.picture();
     let wanted = frame.twin_picture(placements, white)?;

@@ -19,16 +19,16 @@ pub const F32: f64 = 1e-5;
 const SENTINEL: f32 = f32::NAN;
 
 /// Captured faces on the device and on the host.
-pub struct Content<'b> {
+struct Content<'b> {
     baker: &'b Baker,
-    pub capture: Capture,
+    capture: Capture,
     batch: Vec<Slots>,
     drawn: Drawn,
     texels: Vec<[f32; 3]>,
 }
 
 impl<'b> Content<'b> {
-    pub fn new(baker: &'b Baker, mesh: &Mesh, eyes: &[Vec3], settings: (u32, FieldKind, bool)) -> Result<Self> {
+    fn new(baker: &'b Baker, mesh: &Mesh, eyes: &[Vec3], settings: (u32, FieldKind, bool)) -> Result<Self> {
         let capture = capture_of(baker, mesh, settings, Way::usual(baker.device()))?;
         let batch = only_batch(&capture, eyes);
         let texels = if settings.1 == FieldKind::Radiance {
@@ -43,7 +43,7 @@ impl<'b> Content<'b> {
     }
 
     /// The captured value of a texel.
-    pub fn texel(&self, eye: usize, face: usize, x: usize, y: usize) -> [f32; 3] {
+    fn texel(&self, eye: usize, face: usize, x: usize, y: usize) -> [f32; 3] {
         match self.batch[eye][face] {
             // Faces outside the atlas show the background.
             NO_SLOT if self.capture.kind == FieldKind::Radiance => [0.0; 3],
@@ -52,24 +52,8 @@ impl<'b> Content<'b> {
         }
     }
 
-    /// A sample for every eye, at different scales.
-    pub fn samples(&self) -> Vec<SampleFaces> {
-        let sample = |(i, &slots): (usize, &Slots)| {
-            let scale = [1.0, 0.37, 2.5][i % 3];
-            SampleFaces { slots, scale }
-        };
-        self.batch.iter().enumerate().map(sample).collect()
-    }
-
-    pub fn pass(&self, bands: usize) -> Result<Project> {
-        let device = self.baker.device();
-        let library = self.baker.library();
-        let Capture { kind, face_px, columns, .. } = self.capture;
-        Project::new(device, library, bands, kind, face_px, columns)
-    }
-
     /// One capture and projection; every float of the coefficients, what was not written being no number.
-    pub fn run(&self, project: &Project, samples: &[SampleFaces]) -> Result<Vec<f32>> {
+    fn run(&self, project: &Project, samples: &[SampleFaces]) -> Result<Vec<f32>> {
         let device = self.baker.device();
         let stride = project.kind.channels() * channel_stride(project.bands);
         let coefficients = Buffer::with_data(device, "coefficients", &vec![SENTINEL; samples.len() * stride])?;
@@ -86,19 +70,21 @@ impl<'b> Content<'b> {
 
 /// The largest error relative to 1 + what is wanted, and the largest magnitude of what is wanted. Infinite where a
 /// second run differs.
-pub fn compare(content: &Content<'_>, bands: usize) -> Result<(f64, f64)> {
-    let project = content.pass(bands)?;
-    let samples = content.samples();
+fn compare(content: &Content<'_>, bands: usize) -> Result<(f64, f64)> {
+    let Capture { kind, face_px, columns, .. } = content.capture;
+    let project = Project::new(content.baker.device(), content.baker.library(), bands, kind, face_px, columns)?;
+    // Samples have different scales.
+    let sample = |(eye, &slots): (usize, &Slots)| SampleFaces { slots, scale: [1.0, 0.37, 2.5][eye % 3] };
+    let samples: Vec<SampleFaces> = content.batch.iter().enumerate().map(sample).collect();
     let found = content.run(&project, &samples)?;
     let again = content.run(&project, &samples)?;
     let bits = |floats: &[f32]| floats.iter().map(|f| f.to_bits()).collect::<Vec<_>>();
-    let kind = content.capture.kind;
     let stride = kind.channels() * channel_stride(bands);
     let mut worst = 0.0_f64;
     let mut largest = 0.0_f64;
     for (eye, sample) in samples.iter().enumerate() {
         let texel = |face, x, y| content.texel(eye, face, x, y);
-        let wanted = project::twin(bands, kind, content.capture.face_px as usize, sample.scale, texel);
+        let wanted = project::twin(bands, kind, face_px as usize, sample.scale, texel);
         let first = eye * stride;
         for (found, wanted) in found[first..first + stride].iter().zip(&wanted) {
             let error = (f64::from(*found) - wanted).abs() / (1.0 + wanted.abs());
@@ -111,7 +97,7 @@ pub fn compare(content: &Content<'_>, bands: usize) -> Result<(f64, f64)> {
 }
 
 /// Eyes near an object.
-pub const EYES: [Vec3; 3] = [Vec3::new(0.9, 0.6, -0.5), Vec3::new(-0.4, 1.3, 2.0), Vec3::new(0.2, -0.1, -1.6)];
+const EYES: [Vec3; 3] = [Vec3::new(0.9, 0.6, -0.5), Vec3::new(-0.4, 1.3, 2.0), Vec3::new(0.2, -0.1, -1.6)];
 
 pub fn rows(baker: &Baker, add: &mut dyn FnMut(CheckRow)) -> Result<()> {
     let black = Content::new(baker, &generate::torus(1.0, 0.3, 32, 16), &EYES, (32, FieldKind::Occlusion, true))?;

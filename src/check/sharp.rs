@@ -94,13 +94,8 @@ pub fn sharp_options() -> frame::Options {
     frame::Options { lights: Lights::Sharp, bake: crate::bake::Options { silhouette, ..base.bake }, ..base }
 }
 
-/// The text of the scene that the rows light.
-pub fn scene_text() -> String {
-    format!("{MIXED}{MORE}")
-}
-
 pub fn rows(baker: &Baker, add: &mut dyn FnMut(CheckRow)) -> Result<()> {
-    let scene = scene(&scene_text())?;
+    let scene = scene(&format!("{MIXED}{MORE}"))?;
     let placements = scene.at(0.0);
     let cache = Cache::new(None);
     let base = sharp_options();

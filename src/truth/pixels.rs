@@ -152,8 +152,7 @@ pub fn picture(
                 let key = Vertex { entity: seen.entity, index: pixel as usize * places.len() + index };
                 let entity = &scene.entities[seen.entity];
                 let base = seen.over_mean * entity.albedo.as_dvec3();
-                let surface = Reflection::seen(base, seen.gloss, seen.view.normal, seen.toward, cast.single_scatter)
-                    .on(seen.ground, seen.toward);
+                let surface = Reflection::seen(base, &seen, cast.single_scatter);
                 let Estimate { radiosity, error } = caster.reflected(&seen.view, &surface, key);
                 let radiosity = before * DVec3::from(radiosity);
                 let error = before * DVec3::from(error);

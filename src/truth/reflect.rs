@@ -1,5 +1,6 @@
 //! How a point of a surface reflects light towards the eye: diffusely, and by microfacets where it is glossy.
 
+use super::pixels::Seen;
 use super::sequence::Axes;
 use crate::gloss::{brdf, lobe};
 use crate::scene::Gloss;
@@ -36,18 +37,14 @@ impl Reflection {
         Reflection { base, lobe: None, ground: None }
     }
 
-    /// Of a surface seen from the unit vector `toward`; `single_scatter` where light that microfacets pass on to each
-    /// other is lost.
-    pub fn seen(base: DVec3, gloss: Option<Gloss>, normal: DVec3, toward: DVec3, single_scatter: bool) -> Self {
-        let lobe = gloss.map(|gloss| MicrofacetLobe::new(gloss, base, normal, toward, single_scatter));
-        Reflection { base, lobe, ground: None }
-    }
-
-    /// The same on a surface whose own normal is another. Seen from behind it shows its front's diffuse light alone.
-    pub fn on(self, ground: DVec3, toward: DVec3) -> Self {
-        let again = |lobe: MicrofacetLobe| if ground.dot(toward) < 0.0 { DVec3::ZERO } else { lobe.again };
-        let lobe = self.lobe.map(|lobe| MicrofacetLobe { again: again(lobe), ..lobe });
-        Reflection { base: self.base, lobe, ground: Some(ground) }
+    /// Of what a ray from the eye meets; `single_scatter` where light that microfacets pass on to each other is lost.
+    /// Seen from behind it shows its front's diffuse light alone.
+    pub fn seen(base: DVec3, seen: &Seen, single_scatter: bool) -> Self {
+        let lobe = seen.gloss.map(|gloss| {
+            let lobe = MicrofacetLobe::new(gloss, base, seen.view.normal, seen.toward, single_scatter);
+            if seen.ground.dot(seen.toward) < 0.0 { MicrofacetLobe { again: DVec3::ZERO, ..lobe } } else { lobe }
+        });
+        Reflection { base, lobe, ground: Some(seen.ground) }
     }
 
     /// Whether the surface itself does not hide a direction.

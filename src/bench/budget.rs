@@ -9,23 +9,18 @@ use crate::field::Storage;
 use crate::frame::{self, Frame};
 use crate::scene::Lights;
 use crate::scene::light::has_sharp;
-use crate::truth::Vertex;
+use crate::truth::{Vertex, error_map};
 use serde::Serialize;
 
 /// Values of the compared vertices, from values of all vertices by entity.
-pub fn select(all: &[(usize, Vec<Radiosity>)], vertices: &[Vertex]) -> Vec<Radiosity> {
+fn select<T: Copy + Into<f64>>(all: &[(usize, Vec<[T; 3]>)], vertices: &[Vertex]) -> Vec<Radiosity> {
     let of = |v: &Vertex| all.iter().find(|(entity, _)| *entity == v.entity).expect("it receives").1[v.index];
-    vertices.iter().map(of).collect()
+    vertices.iter().map(|vertex| of(vertex).map(Into::into)).collect()
 }
 
 /// The device's radiosity of the compared vertices after a merge.
 pub fn device_radiosity(frame: &Frame, vertices: &[Vertex]) -> Result<Vec<Radiosity>> {
-    let mut all = Vec::new();
-    for (entity, _) in frame.scene().entities.iter().enumerate().filter(|(_, e)| e.receives) {
-        let wide = frame.radiosity(entity)?.into_iter().map(|rgb| rgb.map(f64::from)).collect();
-        all.push((entity, wide));
-    }
-    Ok(select(&all, vertices))
+    Ok(select(&error_map::radiosity(frame)?, vertices))
 }
 
 /// The errors of one case.

@@ -65,6 +65,14 @@ impl Error {
         self.map(|message| format!("{message}; {what}"))
     }
 
+    /// An output that cannot be written is a run that failed, not bad input.
+    pub fn unwritten(self) -> Self {
+        match self {
+            Error::Input(message) => Error::Failed(message),
+            other => other,
+        }
+    }
+
     fn map(self, change: impl FnOnce(String) -> String) -> Self {
         match self {
             Error::Failed(m) => Error::Failed(change(m)),

@@ -83,7 +83,7 @@ pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
     let origin = context.origin(global);
     // A field that the validation layer objected to is not written.
     context.finish()?;
-    field.write(out).map_err(output::unwritten)?;
+    field.write(out).map_err(Error::unwritten)?;
     output::say(if global.json {
         let file = out.display().to_string();
         let header = &field.header;

@@ -52,14 +52,6 @@ pub fn note(global: &Global, line: impl AsRef<str>) {
     }
 }
 
-/// A field that cannot be written is a run that failed, not bad input.
-pub fn unwritten(error: Error) -> Error {
-    match error {
-        Error::Input(message) => Error::Failed(message),
-        other => other,
-    }
-}
-
 /// Starts the log on stderr: warnings by default, more with `-v`, as RUST_LOG says where it is set.
 pub fn start_log(global: &Global) {
     let level = match (global.quiet, global.verbose) {

@@ -78,10 +78,7 @@ impl Editor {
     pub fn save(&mut self, path: &Path) -> Result<()> {
         let data = self.data(path.parent().unwrap_or(Path::new("")));
         let head = "Written by shadow-fields view; `shadow-fields render` gives the same picture.";
-        data.write(path, head).map_err(|error| match error {
-            Error::Input(message) => Error::Failed(message),
-            other => other,
-        })?;
+        data.write(path, head).map_err(Error::unwritten)?;
         self.saved.insert(path.to_owned());
         self.kept = self.scene().data.clone();
         Ok(())

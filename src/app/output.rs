@@ -112,18 +112,13 @@ impl Progress {
     /// Shows that `done` of `all` pictures are rendered; a single one needs no bar.
     pub fn pictures(&self, done: u32, all: u32) {
         if all > 1 {
-            self.bar("rendering pictures", "{msg} [{bar:32}] {pos}/{len}, {eta} left", done, all);
+            self.count("rendering pictures", done, all);
         }
     }
 
-    /// Shows that rays were cast for `done` of `all` rows of pixels.
-    pub fn rows(&self, done: u32, all: u32) {
-        self.bar("casting rays by rows", "{msg} [{bar:32}] {pos}/{len}, {eta} left", done, all);
-    }
-
-    /// Shows that `done` of `all` slices are done.
-    pub fn slices(&self, done: u32, all: u32) {
-        self.bar("running slices", "{msg} [{bar:32}] {pos}/{len}, {eta} left", done, all);
+    /// Shows that `done` of `all` pieces of some work are done.
+    pub fn count(&self, what: &str, done: u32, all: u32) {
+        self.bar(what, "{msg} [{bar:32}] {pos}/{len}, {eta} left", done, all);
     }
 
     fn bar(&self, what: &str, template: &str, done: u32, all: u32) {

@@ -240,7 +240,7 @@ impl<'a> Rendering<'a> {
         let world = World::of(self.scene, placements);
         let cast = self.rays();
         let [_, height] = self.options.size;
-        let tell = |rows: u32| self.context.progress.rows(rows, height);
+        let tell = |rows: u32| self.context.progress.count("casting rays by rows", rows, height);
         let smoothed = self.options.antialias != Antialias::None;
         pixels::picture(&world, self.options.size, smoothed, &cast, &tell)
     }

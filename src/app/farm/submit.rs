@@ -101,7 +101,7 @@ fn passed_on(global: &Global) -> Result<Vec<String>> {
 fn local(global: &Global, arguments: &Arguments, call: &Call, slices: &[usize]) -> Result<()> {
     let workers = arguments.workers.map_or_else(gpu::cores, |workers| workers as usize);
     let progress = Progress::new(global);
-    let failures = local::run(call, workers, slices, &|done| progress.slices(done as u32, slices.len() as u32));
+    let failures = local::run(call, workers, slices, &|done| progress.count("running slices", done as u32, slices.len() as u32));
     for (slice, said) in &failures {
         log::error!("slice {slice}: {said}");
     }

@@ -48,7 +48,7 @@ fn try_slice(call: &Call, slice: usize, workers: usize) -> Result<(), String> {
         if output.status.success() {
             break;
         }
-        let last = last_line(&output).unwrap_or_else(|| output.status.to_string());
+        let last = last_line(&output);
         log::info!("slice {slice}, try {attempt}: {last}");
         // A usage error, another device or program, and bad input stay so.
         if attempt == TRIES || output.status.code().is_some_and(|code| (2..=4).contains(&code)) {
@@ -67,8 +67,9 @@ pub fn output_with_stdin(command: &mut Command) -> std::io::Result<Output> {
     child.wait_with_output()
 }
 
-/// The last line that a process wrote to stderr.
-pub fn last_line(output: &Output) -> Option<String> {
+/// The last line that a process wrote to stderr, or how it ended.
+pub fn last_line(output: &Output) -> String {
     let said = String::from_utf8_lossy(&output.stderr);
-    said.lines().rfind(|line| !line.trim().is_empty()).map(str::to_owned)
+    let last = said.lines().rfind(|line| !line.trim().is_empty());
+    last.map_or_else(|| output.status.to_string(), str::to_owned)
 }

@@ -10,7 +10,7 @@ use crate::gpu::{self, Validation};
 use clap::{Args, ValueEnum};
 use serde_json::json;
 use std::path::{Path, PathBuf};
-use std::process::Command;
+use std::process::{self, Command};
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 enum Engine {
@@ -101,7 +101,8 @@ fn passed_on(global: &Global) -> Result<Vec<String>> {
 fn local(global: &Global, arguments: &Arguments, call: &Call, slices: &[usize]) -> Result<()> {
     let workers = arguments.workers.map_or_else(gpu::cores, |workers| workers as usize);
     let progress = Progress::new(global);
-    let failures = local::run(call, workers, slices, &|done| progress.count("running slices", done as u32, slices.len() as u32));
+    let failures =
+        local::run(call, workers, slices, &|done| progress.count("running slices", done as u32, slices.len() as u32));
     for (slice, said) in &failures {
         log::error!("slice {slice}: {said}");
     }
@@ -113,14 +114,20 @@ fn local(global: &Global, arguments: &Arguments, call: &Call, slices: &[usize]) 
     Err(Error::Failed(format!("{} of {all} failed; slice {slice}: {said}", failures.len())))
 }
 
-fn cannot_start(program: &str, error: &std::io::Error) -> Error {
-    Error::Failed(format!("{program}: cannot be started: {error}"))
-}
-
-/// A command as a line of a shell.
-fn shown(command: &Command) -> String {
-    let words = [command.get_program()].into_iter().chain(command.get_args());
-    engines::shell(&json!(words.map(|word| word.to_string_lossy()).collect::<Vec<_>>()))
+/// Runs an engine's command by `to_end`; with --dry-run only says it, and answers with `None`.
+fn start(
+    arguments: &Arguments,
+    mut command: Command,
+    to_end: fn(&mut Command) -> std::io::Result<process::Output>,
+) -> Result<Option<process::Output>> {
+    if arguments.dry_run {
+        let words = [command.get_program()].into_iter().chain(command.get_args());
+        output::say(engines::shell(&json!(words.map(|word| word.to_string_lossy()).collect::<Vec<_>>())));
+        return Ok(None);
+    }
+    let program = command.get_program().to_string_lossy().into_owned();
+    let cannot = |error| Error::Failed(format!("{program}: cannot be started: {error}"));
+    to_end(&mut command).map(Some).map_err(cannot)
 }
 
 fn slurm(arguments: &Arguments, call: &Call, path: &Path, slices: &[usize]) -> Result<()> {
@@ -132,13 +139,9 @@ fn slurm(arguments: &Arguments, call: &Call, path: &Path, slices: &[usize]) -> R
     let limit = arguments.workers.map_or_else(String::new, |workers| format!("%{workers}"));
     let mut command = Command::new("sbatch");
     command.arg(format!("--array={}{limit}", engines::ranges(slices))).arg(output).arg(&script);
-    if arguments.dry_run {
-        output::say(shown(&command));
-        return Ok(());
-    }
-    let done = command.output().map_err(|error| cannot_start("sbatch", &error))?;
+    let Some(done) = start(arguments, command, Command::output)? else { return Ok(()) };
     if !done.status.success() {
-        let said = local::last_line(&done).unwrap_or_else(|| done.status.to_string());
+        let said = local::last_line(&done);
         return Err(Error::Failed(format!("{said} (an array may be too long: plan with more --per-slice)")));
     }
     output::say(String::from_utf8_lossy(&done.stdout).trim_end());
@@ -150,14 +153,8 @@ fn dask(arguments: &Arguments, call: &Call, path: &Path, slices: &[usize]) -> Re
     crate::text::write(&script, engines::dask(call, slices, arguments.scheduler.as_deref(), arguments.workers))?;
     let mut command = Command::new("python3");
     command.arg(&script);
-    if arguments.dry_run {
-        output::say(shown(&command));
-        return Ok(());
+    match start(arguments, command, local::output_with_stdin)? {
+        Some(done) if !done.status.success() => Err(Error::Failed(format!("dask: {}", local::last_line(&done)))),
+        _ => Ok(()),
     }
-    let done = local::output_with_stdin(&mut command).map_err(|error| cannot_start("python3", &error))?;
-    if done.status.success() {
-        return Ok(());
-    }
-    let said = local::last_line(&done).unwrap_or_else(|| done.status.to_string());
-    Err(Error::Failed(format!("dask: {said}")))
 }

@@ -19,17 +19,17 @@ impl Output {
         Output { option, ending, files: vec![file.into()] }
     }
 
-    /// Adds files that the option writes beside the first, or in a folder that it makes there.
-    pub fn with<P: Into<PathBuf>>(mut self, files: impl IntoIterator<Item = P>) -> Self {
-        self.files.extend(files.into_iter().map(Into::into));
-        self
-    }
-
     /// Pictures of these numbers where the name has a run of `#`, else one picture.
     pub fn pictures(option: &'static str, file: &Path, ending: &'static str, numbers: Range<u32>) -> Result<Self> {
-        let numbered = Numbered::new(file)?;
-        let files = numbered.map_or_else(|| vec![file.into()], |name| numbers.map(|n| name.path(n)).collect());
-        Ok(Output { option, ending, files })
+        let name = PictureName::new(file)?;
+        let numbers = if name.is_numbered() { numbers } else { 0..1 };
+        Ok(Output { option, ending, files: numbers.map(|number| name.path(number)).collect() })
+    }
+
+    /// Those of its files that are there; `None` where none is.
+    pub fn existing(mut self) -> Option<Self> {
+        self.files.retain(|file| file.exists());
+        (!self.files.is_empty()).then_some(self)
     }
 }
 
@@ -94,30 +94,41 @@ pub fn check_ending(option: &str, path: &Path, ending: &str) -> Result<()> {
     Err(Error::Usage(format!("{option} {}: the name must end in .{ending}", path.display())))
 }
 
-/// An output name with a run of `#` that stands for the frame's number.
-pub struct Numbered {
-    before: String,
-    digits: usize,
-    after: String,
+/// A name that pictures are written to.
+pub enum PictureName {
+    One(PathBuf),
+    /// One with a run of `#` that stands for the picture's number.
+    Numbered {
+        before: String,
+        digits: usize,
+        after: String,
+    },
 }
 
-impl Numbered {
-    /// The parts of a name; `None` where it has no run of `#`.
-    pub fn new(path: &Path) -> Result<Option<Self>> {
-        if !path.as_os_str().as_encoded_bytes().contains(&b'#') {
-            return Ok(None);
+impl PictureName {
+    pub fn new(name: &Path) -> Result<Self> {
+        if !name.as_os_str().as_encoded_bytes().contains(&b'#') {
+            return Ok(PictureName::One(name.into()));
         }
-        let Some(text) = path.to_str() else {
-            return Err(Error::Usage(format!("{}: a name with # has to be UTF-8", path.display())));
+        let Some(text) = name.to_str() else {
+            return Err(Error::Usage(format!("{}: a name with # has to be UTF-8", name.display())));
         };
-        Ok(text.find('#').map(|at| {
-            let digits = text[at..].bytes().take_while(|b| *b == b'#').count();
-            Numbered { before: text[..at].into(), digits, after: text[at + digits..].into() }
-        }))
+        let (before, rest) = text.split_once('#').expect("one of its bytes");
+        let after = rest.trim_start_matches('#');
+        Ok(PictureName::Numbered { before: before.into(), digits: 1 + rest.len() - after.len(), after: after.into() })
+    }
+
+    pub fn is_numbered(&self) -> bool {
+        matches!(self, PictureName::Numbered { .. })
     }
 
     /// The name of one picture.
-    pub fn path(&self, index: u32) -> PathBuf {
-        format!("{}{index:0width$}{}", self.before, self.after, width = self.digits).into()
+    pub fn path(&self, number: u32) -> PathBuf {
+        match self {
+            PictureName::One(name) => name.clone(),
+            PictureName::Numbered { before, digits, after } => {
+                format!("{before}{number:0width$}{after}", width = *digits).into()
+            }
+        }
     }
 }

@@ -1,7 +1,7 @@
 //! `shadow-fields render` renders a scene to pictures, or to a table of vertices.
 
 use super::context::Context;
-use super::outputs::{self, Numbered, Output};
+use super::outputs::{self, Output, PictureName};
 use super::source::{GltfSceneArguments, LookArguments};
 use super::{Global, output};
 use crate::asset::picture;
@@ -147,7 +147,7 @@ struct Rendering<'a> {
     options: frame::Options,
     /// `None` where rays light all that is written.
     frame: Option<Frame>,
-    numbered_exr: Option<Numbered>,
+    exr: Option<PictureName>,
     prepared: Duration,
     /// Scene time of each picture in seconds, its wall time and its passes.
     timings: Vec<(f64, Duration, Vec<Timing>)>,
@@ -178,7 +178,7 @@ impl<'a> Rendering<'a> {
             scene,
             options,
             frame,
-            numbered_exr: arguments.exr.as_deref().map(Numbered::new).transpose()?.flatten(),
+            exr: arguments.exr.as_deref().map(PictureName::new).transpose()?,
             prepared,
             timings: Vec::new(),
             worst_error: 0.0,
@@ -205,11 +205,8 @@ impl<'a> Rendering<'a> {
             }
         };
         self.timings.push((time_s, start.elapsed(), passes));
-        let exr = match &self.numbered_exr {
-            Some(numbered) => Some(numbered.path(index)),
-            None => arguments.exr.clone().filter(|_| number + 1 == arguments.frames),
-        };
-        if let Some(path) = exr {
+        let exr = self.exr.as_ref().filter(|name| name.is_numbered() || number + 1 == arguments.frames);
+        if let Some(path) = exr.map(|name| name.path(index)) {
             let [width, height] = self.options.size;
             let linear = match (linear, &mut self.frame) {
                 (None, Some(frame)) => {
@@ -247,19 +244,16 @@ impl<'a> Rendering<'a> {
 
     /// Writes all pictures: one file, an animated PNG, or numbered files.
     fn write_pictures(&mut self) -> Result<()> {
-        let numbered = Numbered::new(&self.arguments.output)?;
+        let name = PictureName::new(&self.arguments.output)?;
         let arguments = self.arguments;
         let [width, height] = self.options.size;
         let exposure_ev = self.scene.data.output.exposure_ev();
-        if numbered.is_none() && arguments.frames > 1 {
+        if !name.is_numbered() && arguments.frames > 1 {
             let frames = (0..arguments.frames).map(|index| Ok(picture::encode_srgb(&self.draw(index)?, exposure_ev)));
             return picture::write_apng(&arguments.output, width, height, frames, arguments.picture.fps);
         }
         for index in 0..arguments.frames {
-            let path = match &numbered {
-                Some(numbered) => numbered.path(arguments.first + index),
-                None => arguments.output.clone(),
-            };
+            let path = name.path(arguments.first + index);
             picture::write_png(&path, width, height, &self.draw(index)?, exposure_ev)?;
         }
         Ok(())

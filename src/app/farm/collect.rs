@@ -1,6 +1,6 @@
 //! `shadow-fields farm collect` checks results and makes cache files and pictures of them.
 
-use super::super::outputs::Numbered;
+use super::super::outputs::PictureName;
 use super::super::{Global, context, output};
 use crate::error::{Error, Result};
 use crate::farm::engines::ranges;
@@ -36,7 +36,10 @@ pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
             }
             SliceResult::Whole(files) => {
                 for (name, bytes) in files {
-                    replace(&target(&plan, slice, &name, cache_dir.as_deref())?, &bytes)?;
+                    let path = target(&plan, slice, &name, cache_dir.as_deref())?;
+                    if !crate::files::read(&path).is_ok_and(|found| found == bytes) {
+                        crate::text::write(&path, &bytes)?;
+                    }
                     written += 1;
                 }
             }
@@ -72,8 +75,7 @@ fn target(plan: &Plan, slice: usize, name: &str, cache_dir: Option<&Path>) -> Re
     let pattern = &plan.films[film as usize].pictures;
     let number = name.strip_suffix(".png").and_then(|number| number.parse().ok());
     let number = number.ok_or_else(|| Error::Failed(format!("a result of pictures holds a file {name:?}")))?;
-    let numbered = Numbered::new(Path::new(pattern))?;
-    Ok(plan.folder.join(numbered.map_or_else(|| pattern.into(), |numbered| numbered.path(number))))
+    Ok(plan.folder.join(PictureName::new(Path::new(pattern))?.path(number)))
 }
 
 /// Removes a file that another process may remove as well.
@@ -84,12 +86,4 @@ fn remove(path: &Path) -> Result<()> {
         }
         _ => Ok(()),
     }
-}
-
-/// Writes a file that is not there as it should be.
-fn replace(path: &Path, bytes: &[u8]) -> Result<()> {
-    if crate::files::read(path).is_ok_and(|found| found == bytes) {
-        return Ok(());
-    }
-    crate::text::write(path, bytes)
 }

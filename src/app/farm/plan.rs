@@ -1,7 +1,7 @@
 //! `shadow-fields farm plan` cuts bakes and pictures into slices.
 
 use super::super::context::Context;
-use super::super::outputs::{self, Numbered, Output, check_ending};
+use super::super::outputs::{self, Output, PictureName, check_ending};
 use super::super::render::PictureArguments;
 use super::super::{Global, output};
 use super::run::scene_hash;
@@ -10,7 +10,7 @@ use crate::error::{Error, Result};
 use crate::farm::plan::{device_class, plain};
 use crate::farm::{Film, Input, Plan, counted};
 use crate::merge::calibrate;
-use crate::scene::{self, Scene};
+use crate::scene::{self, Scene, gltf, single};
 use crate::truth::exposure;
 use clap::Args;
 use rayon::prelude::*;
@@ -105,17 +105,11 @@ pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
 fn check_outputs(arguments: &Arguments, inputs: &[PathBuf], folder: &Path, patterns: &[String]) -> Result<()> {
     let path = &arguments.output;
     let mut outputs = vec![Output::new("--output", path, "json")];
+    let numbers = 0..arguments.frames.unwrap_or(1);
     for pattern in patterns {
-        let pattern = folder.join(pattern);
-        let pictures = match Numbered::new(&pattern)? {
-            Some(numbered) => (0..arguments.frames.unwrap_or(1)).map(|number| numbered.path(number)).collect(),
-            None => vec![pattern],
-        };
+        let pictures = Output::pictures("--pictures", &folder.join(pattern), "png", numbers.clone())?;
         // `collect` makes their folder: only one that is there can be an input.
-        let mut pictures = pictures.into_iter().filter(|path| path.exists());
-        if let Some(first) = pictures.next() {
-            outputs.push(Output::new("--pictures", first, "png").with(pictures));
-        }
+        outputs.extend(pictures.existing());
     }
     outputs::check(inputs, &outputs)?;
     if path.is_file() && !arguments.force && !Plan::is_at(path) {
@@ -137,7 +131,7 @@ fn patterns(arguments: &Arguments, scenes: &[PathBuf]) -> Result<Vec<String>> {
     };
     plain(Path::new(pictures))?;
     check_ending("--pictures", Path::new(pictures), "png")?;
-    if frames > 1 && Numbered::new(Path::new(pictures))?.is_none() {
+    if frames > 1 && !PictureName::new(Path::new(pictures))?.is_numbered() {
         return wrong(format!("--pictures {pictures}: the name needs a run of # for the number"));
     }
     let name = |path: &PathBuf| path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
@@ -152,10 +146,7 @@ fn patterns(arguments: &Arguments, scenes: &[PathBuf]) -> Result<Vec<String>> {
 
 /// Meshes and scenes of the works, in order of their names within a folder.
 fn find(global: &Global, works: &[PathBuf]) -> Result<(Vec<PathBuf>, Vec<PathBuf>)> {
-    let has_ending = |path: &Path, endings: &[&str]| {
-        path.extension().is_some_and(|ending| endings.iter().any(|known| ending.eq_ignore_ascii_case(known)))
-    };
-    let is_mesh = |path: &Path| has_ending(path, &["obj", "glb", "gltf"]);
+    let is_mesh = |path: &Path| gltf::is_gltf(path) || single::is_obj(path);
     let mut meshes = Vec::new();
     let mut scenes = Vec::new();
     for path in works {
@@ -176,7 +167,7 @@ fn find(global: &Global, works: &[PathBuf]) -> Result<(Vec<PathBuf>, Vec<PathBuf
             meshes.extend(found);
         } else if is_mesh(path) {
             meshes.push(path.clone());
-        } else if has_ending(path, &["toml"]) {
+        } else if path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("toml")) {
             scenes.push(path.clone());
         } else {
             return Err(Error::input(path, "expected a folder, a mesh (.obj, .glb, .gltf) or a scene (.toml)"));

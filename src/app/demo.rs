@@ -3,18 +3,17 @@
 use super::bench::table;
 use super::context::Context;
 use super::{Global, output, outputs};
-use crate::asset::picture;
+use crate::asset::picture::write_png;
 use crate::bench::cases;
 use crate::bench::figures::spread;
 use crate::bench::profile::frame_times;
 use crate::draw::Antialias;
 use crate::error::Result;
-use crate::frame::{self, Frame, RenderOptions};
-use crate::scene::Scene;
+use crate::frame::RenderOptions;
 use clap::Args;
 use serde_json::json;
 use std::collections::BTreeMap;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::time::Instant;
 
 #[derive(Args)]
@@ -45,12 +44,10 @@ pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
     outputs::check_folder("--output", &arguments.output, &[])?;
     let context = Context::new(global)?;
     crate::text::make_folder(&arguments.output)?;
-    let mut written = Vec::new();
     let mut rows = Vec::new();
     for name in SCENES {
-        let scene = cases::scene(name)?.scene;
-        let row = still(&context, arguments, name, &scene, &mut written, started)?;
-        output::note(global, format!("{}: {:.0} ms a frame", output::shown(&written[written.len() - 1]), row.frame_ms));
+        let row = still(&context, arguments, name, started)?;
+        output::note(global, format!("{}: {:.0} ms a frame", output::shown(&row.picture), row.frame_ms));
         rows.push(row);
     }
     let origin = context.origin(global);
@@ -59,7 +56,7 @@ pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
     }
     context.finish()?;
     if global.json {
-        let files: Vec<_> = written.iter().map(|path| path.display().to_string()).collect();
+        let files: Vec<_> = rows.iter().map(|row| row.picture.display().to_string()).collect();
         output::say(json!({ "origin": origin, "scenes": rows, "pictures": files }).to_string());
         return Ok(());
     }
@@ -81,9 +78,7 @@ pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
     );
     let first = rows.first().map_or(0.0, |row| row.first_picture_s);
     output::say(format!("first picture after {first:.2} s, all after {:.1} s", started.elapsed().as_secs_f64()));
-    for path in written {
-        output::say(output::shown(&path));
-    }
+    rows.iter().for_each(|row| output::say(output::shown(&row.picture)));
     Ok(())
 }
 
@@ -103,26 +98,23 @@ struct DemoRow {
     frames_per_s_at_1_sample: f64,
     first_picture_s: f64,
     variant: &'static str,
+    #[serde(skip)]
+    picture: PathBuf,
 }
 
 /// The scene's picture, and its frame time while it moves: frames as a window shows them, not read back, edges smoothed
 /// one way and another.
-fn still(
-    context: &Context,
-    arguments: &Arguments,
-    name: &'static str,
-    scene: &Scene,
-    written: &mut Vec<PathBuf>,
-    started: Instant,
-) -> Result<DemoRow> {
-    let options = arguments.options.frame(scene)?;
-    let mut frame = context.frame(scene, options)?;
-    let path = arguments.output.join(format!("{name}.png"));
-    draw(&mut frame, scene, options, &path)?;
+fn still(context: &Context, arguments: &Arguments, name: &'static str, started: Instant) -> Result<DemoRow> {
+    let scene = cases::scene(name)?.scene;
+    let options = arguments.options.frame(&scene)?;
+    let mut frame = context.frame(&scene, options)?;
+    let picture = arguments.output.join(format!("{name}.png"));
+    let [width, height] = options.size;
+    frame.render(&scene.at(0.0), Some(scene.data.output.white()))?;
+    write_png(&picture, width, height, &frame.picture(), scene.data.output.exposure_ev())?;
     let first_picture_s = started.elapsed().as_secs_f64();
-    written.push(path);
 
-    let mut timed = |antialias| frame_times(&mut frame, scene, antialias, arguments.timed_frames);
+    let mut timed = |antialias| frame_times(&mut frame, &scene, antialias, arguments.timed_frames);
     let outlines = timed(Antialias::Outlines)?;
     let samples = timed(Antialias::Samples)?;
     let single = timed(Antialias::None)?;
@@ -144,11 +136,6 @@ fn still(
         frames_per_s_at_1_sample: 1e3 / median(&single, &["frame"]),
         first_picture_s,
         variant: frame.variant().name,
+        picture,
     })
-}
-
-fn draw(frame: &mut Frame, scene: &Scene, options: frame::Options, path: &Path) -> Result<()> {
-    let exposure_ev = scene.data.output.exposure_ev();
-    frame.render(&scene.at(0.0), Some(scene.data.output.white()))?;
-    picture::write_png(path, options.size[0], options.size[1], &frame.picture(), exposure_ev)
 }

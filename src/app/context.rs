@@ -79,7 +79,6 @@ pub struct Context {
     pub cache: Cache,
     /// Where bakes show how far they are.
     pub progress: Progress,
-    validation: Validation,
 }
 
 impl Context {
@@ -110,7 +109,7 @@ impl Context {
         let library = Library { shader_dir: global.shader_dir.clone(), cache_dir: cache_dir.clone() };
         let cache = Cache::new(cache_dir.as_deref());
         let baker = Baker::new(&device, &library);
-        Ok(Context { device, baker, cache, progress: Progress::new(global), validation: global.validation })
+        Ok(Context { device, baker, cache, progress: Progress::new(global) })
     }
 
     /// Prepares a scene for drawing.
@@ -139,9 +138,6 @@ impl Context {
     /// Ends the work on the device: keeps its pipeline cache, and fails when the validation layer had something to say.
     pub fn finish(self) -> Result<()> {
         self.device.save_pipeline_cache();
-        if self.validation == Validation::Off {
-            return Ok(());
-        }
         gpu::validation::Messages::into_result(self.device.take_validation_messages())
     }
 

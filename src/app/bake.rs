@@ -12,7 +12,7 @@ use crate::field::FieldKind;
 use crate::scene;
 use crate::text::{number, triple};
 use clap::Args;
-use clap::builder::BoolishValueParser;
+use clap::builder::{BoolishValueParser, TypedValueParser};
 use glam::Vec3;
 use serde_json::json;
 use std::path::{Path, PathBuf};
@@ -29,7 +29,7 @@ pub struct Arguments {
     output: PathBuf,
     /// Bake a radiance field instead of an occlusion field. The surface shines with this linear RGB radiance, times the
     /// mesh's own colours if it has them. Example: 4,3,2
-    #[arg(long, value_name = "R,G,B", value_parser = color, allow_hyphen_values = true)]
+    #[arg(long, value_name = "R,G,B", value_parser = triple(number(0.0..=RADIANCE_LIMIT)).map(Vec3::from_array), allow_hyphen_values = true)]
     radiance: Option<Vec3>,
     /// Draw fewer and larger triangles of a large mesh in place of those that are far from the eye. What is seen moves
     /// by at most 0.25 texels
@@ -39,17 +39,6 @@ pub struct Arguments {
     bake: BakeOptions,
     #[command(flatten)]
     gltf: GltfArguments,
-}
-
-impl Arguments {
-    fn options(&self) -> Result<bake::Options> {
-        let options = self.bake.resolve()?;
-        Ok(bake::Options { levels: self.levels, ..options })
-    }
-}
-
-fn color(text: &str) -> std::result::Result<Vec3, String> {
-    triple(number(0.0..=RADIANCE_LIMIT))(text).map(Vec3::from_array)
 }
 
 /// A mesh whose surface shines. Its colours are its own, or white, times `radiance`.
@@ -68,7 +57,7 @@ pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
     let inputs = scene::files::of_mesh(&arguments.mesh);
     outputs::check(&inputs, &[Output::new("--output", &arguments.output, "sf")])?;
     let mut mesh = arguments.gltf.mesh(global, &arguments.mesh)?;
-    let options = arguments.options()?;
+    let options = bake::Options { levels: arguments.levels, ..arguments.bake.resolve()? };
     if let Some(radiance) = arguments.radiance {
         mesh = shining(mesh, radiance, &arguments.mesh)?;
     }

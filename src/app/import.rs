@@ -36,7 +36,8 @@ pub struct Arguments {
 
 impl Arguments {
     /// Fails where a file would be replaced that an import did not write.
-    fn check_own(&self, path: &Path) -> Result<()> {
+    fn check_own(&self) -> Result<()> {
+        let path = &self.output;
         let own = format!("# {HEAD}");
         let mut start = vec![0; own.len()];
         let foreign = path.is_file()
@@ -58,9 +59,8 @@ pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
         return Err(Error::Usage(format!("{}: expected a .glb, .gltf or .obj file", arguments.scene.display())));
     }
     let inputs = scene::files::of_scene(&arguments.scene);
-    let output = Output::new("--output", &arguments.output, "toml");
-    outputs::check(&inputs, std::slice::from_ref(&output))?;
-    arguments.check_own(&arguments.output)?;
+    outputs::check(&inputs, &[Output::new("--output", &arguments.output, "toml")])?;
+    arguments.check_own()?;
     let scene: Scene = arguments.gltf.scene(global, &arguments.scene, arguments.time)?;
     let mut data = scene.data.clone();
     let folder = |path: &Path| path.parent().unwrap_or(Path::new("")).to_owned();

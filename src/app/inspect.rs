@@ -6,6 +6,7 @@ use crate::field::{FieldKind, ShadowField};
 use crate::sh::basis::coefficient_count;
 use crate::text::{number, triple};
 use clap::Args;
+use clap::builder::TypedValueParser;
 use glam::DVec3;
 use serde_json::{Value, json};
 use std::path::PathBuf;
@@ -16,16 +17,12 @@ pub struct Arguments {
     /// Field file to show, as `bake` writes it
     field: PathBuf,
     /// Print the field's coefficients at this place, in metres in the mesh's frame. Example: 0,1.5,2
-    #[arg(long, value_name = "X,Y,Z", value_parser = place, allow_hyphen_values = true)]
+    #[arg(long, value_name = "X,Y,Z", value_parser = triple(number(-PLACE_LIMIT_M..=PLACE_LIMIT_M)).map(DVec3::from_array), allow_hyphen_values = true)]
     at: Option<DVec3>,
 }
 
 /// Farthest coordinate of a lookup in metres.
 const PLACE_LIMIT_M: f64 = 1e15;
-
-fn place(text: &str) -> std::result::Result<DVec3, String> {
-    triple(number(-PLACE_LIMIT_M..=PLACE_LIMIT_M))(text).map(DVec3::from_array)
-}
 
 pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
     let field = ShadowField::read(&arguments.field)?;

@@ -72,11 +72,8 @@ enum Subcommands {
 
 /// Runs the program on arguments, the first of which is its name, as the command line does.
 pub fn run_on<A: Into<OsString> + Clone>(arguments: impl IntoIterator<Item = A>) -> Result<()> {
-    run(&parse(arguments)?).and_then(|()| output::written())
-}
-
-fn parse<A: Into<OsString> + Clone>(arguments: impl IntoIterator<Item = A>) -> Result<Cli> {
-    Cli::try_parse_from(arguments).map_err(|error| Error::Usage(error.to_string()))
+    let cli = Cli::try_parse_from(arguments).map_err(|error| Error::Usage(error.to_string()))?;
+    run(&cli).and_then(|()| output::written())
 }
 
 /// Runs the program on the process's arguments and returns its exit code.

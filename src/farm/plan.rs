@@ -51,7 +51,7 @@ pub enum Slice {
     Pictures { film: u32, first: u32, count: u32 },
 }
 
-#[derive(Clone, Debug, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Plan {
     /// The program that made it, with its version. Another version refuses it. Plans of all versions have this key.
@@ -99,16 +99,7 @@ fn runs(all: u32, most: u32) -> impl Iterator<Item = (u32, u32)> {
 impl Plan {
     /// An empty plan for this program.
     pub fn new(device: String, results: String, bake: bake::Options) -> Self {
-        Plan {
-            plan_of: PROGRAM.into(),
-            device,
-            results,
-            bake,
-            meshes: Vec::new(),
-            films: Vec::new(),
-            slices: Vec::new(),
-            folder: PathBuf::new(),
-        }
+        Plan { plan_of: PROGRAM.into(), device, results, bake, ..Plan::default() }
     }
 
     /// Adds meshes, of which a slice bakes `most`.

@@ -6,7 +6,6 @@ use super::reflect::Reflection;
 use super::world::{EntityView, SurfaceHit, VertexView, World};
 use crate::asset::backdrop::Backdrop;
 use crate::draw::camera::through_pixels;
-use crate::scene::Gloss;
 use glam::DVec3;
 use rayon::prelude::*;
 
@@ -35,14 +34,9 @@ pub struct Seen {
     pub toward: DVec3,
     /// Linear RGB radiance that it emits.
     pub emission: DVec3,
-    /// How it reflects besides diffusely.
-    pub gloss: Option<Gloss>,
     /// The surface's own normal, which maps do not tilt, unit.
     pub ground: DVec3,
-    /// Reflectance there over the mean of the entity's, by colour.
-    pub over_mean: DVec3,
-    /// Share of light from behind that it keeps back.
-    pub opacity: f64,
+    pub hit: SurfaceHit,
 }
 
 impl<'w> Eye<'w> {
@@ -81,15 +75,14 @@ impl<'w> Eye<'w> {
     fn surface(&self, sight: &EntityView, direction: DVec3) -> Option<Seen> {
         let world = self.world;
         let entity = sight.entity;
-        let SurfaceHit { place, normal, over_mean, glow, gloss, tilted, opacity } =
-            world.surface_hit(sight, direction)?;
+        let hit = world.surface_hit(sight, direction)?;
         let emission = match world.scene.entities[entity].emission.as_dvec3() {
             DVec3::ZERO => DVec3::ZERO,
-            emission => emission * glow * world.emission(sight, direction).unwrap_or(DVec3::ZERO),
+            emission => emission * hit.glow * world.emission(sight, direction).unwrap_or(DVec3::ZERO),
         };
-        let view = world.surface(entity, place, tilted);
-        let ground = (world.entities[entity].rotation * normal).normalize();
-        Some(Seen { entity, view, toward: -direction, emission, gloss, ground, over_mean, opacity })
+        let view = world.surface(entity, hit.place, hit.tilted);
+        let ground = (world.entities[entity].rotation * hit.normal).normalize();
+        Some(Seen { entity, view, toward: -direction, emission, ground, hit })
     }
 }
 
@@ -145,13 +138,13 @@ pub fn picture(
             for seen in eye.seen(pixel, *place) {
                 radiance += free * seen.emission;
                 let before = free;
-                free *= 1.0 - seen.opacity;
+                free *= 1.0 - seen.hit.opacity;
                 if !scene.entities[seen.entity].receives {
                     continue;
                 }
                 let key = Vertex { entity: seen.entity, index: pixel as usize * places.len() + index };
                 let entity = &scene.entities[seen.entity];
-                let base = seen.over_mean * entity.albedo.as_dvec3();
+                let base = seen.hit.over_mean * entity.albedo.as_dvec3();
                 let surface = Reflection::seen(base, &seen, cast.single_scatter);
                 let Estimate { radiosity, error } = caster.reflected(&seen.view, &surface, key);
                 let radiosity = before * DVec3::from(radiosity);

@@ -40,7 +40,7 @@ impl Reflection {
     /// Of what a ray from the eye meets; `single_scatter` where light that microfacets pass on to each other is lost.
     /// Seen from behind it shows its front's diffuse light alone.
     pub fn seen(base: DVec3, seen: &Seen, single_scatter: bool) -> Self {
-        let lobe = seen.gloss.map(|gloss| {
+        let lobe = seen.hit.gloss.map(|gloss| {
             let lobe = MicrofacetLobe::new(gloss, base, seen.view.normal, seen.toward, single_scatter);
             if seen.ground.dot(seen.toward) < 0.0 { MicrofacetLobe { again: DVec3::ZERO, ..lobe } } else { lobe }
         });

@@ -63,11 +63,7 @@ pub const CONTROLS: &[KeyHelp] = &[
     row("X", "error in false colour", &[(Key::X, false, Command::ToggleError)]),
     row("F12", "write PNG and EXR", &[(Key::F12, false, Command::Screenshot)]),
     row("Ctrl-S", "save as NAME-edited.toml (then NAME-edited-2.toml)", &[(Key::S, true, Command::Save)]),
-    row(
-        "Ctrl-Z / Ctrl-Y",
-        "undo, redo",
-        &[(Key::Z, true, Command::Undo), (Key::Y, true, Command::Redo)],
-    ),
+    row("Ctrl-Z / Ctrl-Y", "undo, redo", &[(Key::Z, true, Command::Undo), (Key::Y, true, Command::Redo)]),
     row("drop a file", "open a scene, a glTF or an OBJ file", &[]),
     row("F1", "fold, unfold this list", &[(Key::F1, false, Command::ToggleKeys)]),
     row("H", "hide, show all panels", &[(Key::H, false, Command::ToggleOverlay)]),

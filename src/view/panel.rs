@@ -66,14 +66,8 @@ pub struct Status<'s> {
 /// A number with spaces between groups of three digits: 12 345.
 pub(super) fn grouped(number: u64) -> String {
     let digits = number.to_string();
-    let mut out = String::new();
-    for (index, digit) in digits.chars().enumerate() {
-        if index > 0 && (digits.len() - index).is_multiple_of(3) {
-            out.push(' ');
-        }
-        out.push(digit);
-    }
-    out
+    let groups = digits.as_bytes().rchunks(3).rev().map(String::from_utf8_lossy);
+    groups.collect::<Vec<_>>().join(" ")
 }
 
 /// Sets a dark style with translucent panels, in which no text is smaller than 12 points.

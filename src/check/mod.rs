@@ -67,10 +67,11 @@ pub const PASSES: [(&str, PassCheck); 10] = [
     ("show", show::rows),
 ];
 
-/// Runs every comparison of the given passes; `told` hears each row as it comes.
-pub fn run(baker: &Baker, passes: &[&str], told: &dyn Fn(&CheckRow)) -> Result<Vec<CheckRow>> {
+/// Runs every comparison of the given passes, of all where none is given; `told` hears each row as it comes.
+pub fn run(baker: &Baker, passes: &[String], told: &dyn Fn(&CheckRow)) -> Result<Vec<CheckRow>> {
     let mut rows = Vec::new();
-    for (_, part) in PASSES.iter().filter(|(name, _)| passes.contains(name)) {
+    let is_wanted = |name: &str| passes.is_empty() || passes.iter().any(|pass| pass == name);
+    for (_, part) in PASSES.iter().filter(|(name, _)| is_wanted(name)) {
         part(baker, &mut |row| {
             told(&row);
             rows.push(row);

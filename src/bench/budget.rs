@@ -1,9 +1,9 @@
 //! The error of a picture, split into its causes by the rungs of [`crate::truth`].
 
-use super::Bench;
 use super::cases::Case;
 use super::figures::{Radiosity, VertexDifference, difference};
 use super::judged::Judged;
+use super::{Bench, default_options};
 use crate::error::Result;
 use crate::field::Storage;
 use crate::frame::{self, Frame};
@@ -45,23 +45,20 @@ pub struct Budget {
     pub sharp_total: Option<VertexDifference>,
 }
 
-/// Computes T1 and T2 with fields and a merge of the given options, all lights in SH, and compares all rungs; then the
-/// same merge with sharp lights.
-pub fn budget(bench: &Bench<'_>, case: &Case, judged: &Judged, options: frame::Options) -> Result<Budget> {
+/// Computes T1 and T2, all lights in SH, and compares all rungs; then the same merge with sharp lights.
+pub fn budget(bench: &Bench<'_>, case: &Case, judged: &Judged) -> Result<Budget> {
     let placements = case.scene.at(case.time_s);
-    let options = frame::Options { lights: Lights::Sh, ..options };
+    let options = frame::Options { lights: Lights::Sh, ..default_options() };
     let wide = frame::Options { bake: crate::bake::Options { storage: Storage::F32, ..options.bake }, ..options };
     let t1 = select(&bench.frame(&case.scene, wide)?.twin(&placements)?, &judged.keys());
-    let mut frame = bench.frame(&case.scene, options)?;
-    frame.render(&placements, None)?;
-    let t2 = judged.found(&frame)?;
-    let sharp_total = if has_sharp(&case.scene, Lights::Sharp) {
-        let mut frame = bench.frame(&case.scene, frame::Options { lights: Lights::Sharp, ..options })?;
+    let merged = |lights: Lights| {
+        let mut frame = bench.frame(&case.scene, frame::Options { lights, ..options })?;
         frame.render(&placements, None)?;
-        Some(judged.error(&judged.found(&frame)?))
-    } else {
-        None
+        judged.found(&frame)
     };
+    let t2 = merged(Lights::Sh)?;
+    let is_sharp = has_sharp(&case.scene, Lights::Sharp);
+    let sharp = is_sharp.then(|| merged(Lights::Sharp)).transpose()?;
     let between = |a: &[Radiosity], b: &[Radiosity]| difference(a, b, judged.unit);
     Ok(Budget {
         case: case.name.clone(),
@@ -70,6 +67,6 @@ pub fn budget(bench: &Bench<'_>, case: &Case, judged: &Judged, options: frame::O
         bands_and_sampling: between(&judged.t0, &t1),
         arithmetic_and_storage: between(&t1, &t2),
         total: between(&judged.t0, &t2),
-        sharp_total,
+        sharp_total: sharp.map(|found| judged.error(&found)),
     })
 }

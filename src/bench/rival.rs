@@ -91,12 +91,9 @@ impl Merged {
         let merged = |(lights, shading): &(Option<Lights>, Shading)| {
             let usual = default_options();
             let size = if place == JudgedAt::Pixels { PIXEL_SIZE } else { usual.size };
-            let lights_of_frame = lights.unwrap_or_default();
-            let options = frame::Options { lights: lights_of_frame, shading: Some(*shading), size, ..usual };
+            let options = frame::Options { lights: lights.unwrap_or_default(), shading: Some(*shading), size, ..usual };
             let frame = bench.frame(&case.scene, options)?;
-            let walls = Vec::new();
-            let merges = Vec::new();
-            Ok(Merged { place, lights: *lights, shading: *shading, frame, walls, merges })
+            Ok(Merged { place, lights: *lights, shading: *shading, frame, walls: Vec::new(), merges: Vec::new() })
         };
         ways.iter().map(merged).collect()
     }

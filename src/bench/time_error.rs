@@ -38,7 +38,7 @@ pub fn run(bench: &Bench<'_>, cases: &[Case]) -> Result<TimeErrorOutcome> {
     for (index, case) in cases.iter().enumerate() {
         (bench.progress)(&format!("case {} of {}, {}: casting rays", index + 1, cases.len(), case.name));
         let judged = Judged::vertices_of(bench, case)?;
-        outcome.budgets.push(budget(bench, case, &judged, default_options())?);
+        outcome.budgets.push(budget(bench, case, &judged)?);
         (bench.progress)(&format!("{}: errors split into their causes", case.name));
         outcome.qualities.extend(qualities(bench, case, &judged)?);
         outcome.comparisons.extend(compare(bench, case, &judged)?);

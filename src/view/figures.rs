@@ -102,6 +102,11 @@ fn sliders(ui: &mut Ui, editor: &Editor, commands: &mut Vec<Command>) {
     slide(ui, "sky turned", environment.turn_deg, -180.0..=180.0, "°", Command::SetSkyTurn);
 }
 
+/// Time of a pass in a frame, ms.
+pub(super) fn pass_ms(passes: &[Timing], name: &str) -> f64 {
+    passes.iter().filter(|timing| timing.pass == name).map(|timing| timing.milliseconds).sum()
+}
+
 /// Draws stacked times of the passes in milliseconds, the newest at the right.
 fn graph(ui: &mut Ui, timings: &VecDeque<Vec<Timing>>) {
     let (response, painter) = ui.allocate_painter(vec2(ui.available_width(), HEIGHT), Sense::hover());
@@ -123,7 +128,7 @@ fn graph(ui: &mut Ui, timings: &VecDeque<Vec<Timing>>) {
         let right = area.right() - column as f32 * step;
         let mut bottom = area.bottom();
         for (index, name) in names.iter().enumerate() {
-            let milliseconds: f64 = frame.iter().filter(|t| t.pass == *name).map(|t| t.milliseconds).sum();
+            let milliseconds = pass_ms(frame, name);
             let height = ((milliseconds / top) as f32 * area.height()).min(bottom - area.top());
             let bar = Rect::from_min_max(pos2(right - step, bottom - height), pos2(right, bottom));
             painter.rect_filled(bar, 0.0, PASS_COLORS[index % PASS_COLORS.len()]);
@@ -150,12 +155,7 @@ fn graph(ui: &mut Ui, timings: &VecDeque<Vec<Timing>>) {
     }
     ui.horizontal_wrapped(|ui| {
         for (index, name) in names.iter().enumerate() {
-            let of = |frame: &Vec<Timing>| {
-                frame
-                    .iter()
-                    .any(|t| t.pass == *name)
-                    .then(|| frame.iter().filter(|t| t.pass == *name).map(|t| t.milliseconds).sum())
-            };
+            let of = |frame: &Vec<Timing>| frame.iter().any(|t| t.pass == *name).then(|| pass_ms(frame, name));
             let [median] = quantiles(&timings.iter().filter_map(of).collect::<Vec<_>>(), [0.5]);
             let text = format!("{name} {median:.1} ms");
             ui.label(RichText::new(text).color(PASS_COLORS[index % PASS_COLORS.len()]));

@@ -3,6 +3,7 @@
 
 use super::command::Changed;
 use super::editor::Editor;
+use super::figures::pass_ms;
 use super::task::{BackgroundTask, TaskWorker};
 use super::viewer::{Previewed, Viewer};
 use crate::asset::environment::EnvironmentData;
@@ -38,9 +39,7 @@ pub(super) struct Pace {
 impl Pace {
     /// Takes in the passes of a frame.
     pub fn note(&mut self, passes: &[Timing], refined: bool) {
-        let of = |name: &str| {
-            passes.iter().filter(|timing| timing.pass == name).map(|timing| timing.milliseconds).sum::<f64>()
-        };
+        let of = |name: &str| pass_ms(passes, name);
         if passes.iter().any(|timing| timing.pass == "merge") {
             let all = passes.iter().map(|timing| timing.milliseconds).sum::<f64>();
             self.light = all - of("mirror") - of("draw") - of("smooth") - of("show");

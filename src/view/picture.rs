@@ -42,15 +42,13 @@ impl Viewer {
             self.land()?;
         }
         let shot = match &mut canvas {
-            FrameTarget::Window(window) => match window.acquire()? {
-                Some(shot) => Some(shot),
-                None => return Ok(false),
-            },
+            FrameTarget::Window(window) => window.acquire()?,
             FrameTarget::Image(_) => None,
         };
         let target = match (&canvas, &shot) {
             (FrameTarget::Image(image), _) => *image,
-            (FrameTarget::Window(_), shot) => &*shot.as_ref().expect("a window gave a shot").image,
+            (FrameTarget::Window(_), Some(shot)) => &*shot.image,
+            (FrameTarget::Window(_), None) => return Ok(false),
         };
         let size = [target.shape.width, target.shape.height];
         let viewports = self.viewports(size);

@@ -51,9 +51,8 @@ pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
         let inputs = [&arguments.first, &arguments.second].into_iter().chain(&arguments.mask).cloned();
         outputs::check(&inputs.collect::<Vec<_>>(), &[Output::new("--output", path, "png")])?;
     }
-    let [a, b] = [&arguments.first, &arguments.second].map(|path| Picture::read(path));
-    let a = a?;
-    let b = b?;
+    let a = Picture::read(&arguments.first)?;
+    let b = Picture::read(&arguments.second)?;
     for (picture, path) in [(&a, &arguments.first), (&b, &arguments.second)] {
         if picture.is_transparent {
             output::note(

@@ -294,6 +294,8 @@ impl<'a> Rendering<'a> {
     fn report(&self, last_frame: &Value, error: &Value) -> Value {
         let frame = self.frame.as_ref();
         let options = &self.options;
+        let lights = light::listed(self.scene, options.lights).into_iter();
+        let lights = lights.map(|(name, form)| json!({ "name": name, "form": form.name() }));
         let pictures = self.timings.iter().map(|(time_s, wall, passes)| {
             let named = |t: &Timing| (format!("{}_ms", t.pass.replace(' ', "_")), json!(t.milliseconds));
             // Only pixels that evaluate sharp lights are counted.
@@ -310,7 +312,7 @@ impl<'a> Rendering<'a> {
             "entities": self.scene.entities.len(),
             "receiver_vertices": frame.map(Frame::receiver_vertex_count),
             "variant": frame.map(|frame| frame.variant().name),
-            "lights": self.lights(),
+            "lights": lights.collect::<Vec<_>>(),
             "last_frame": last_frame,
             "device_bytes": frame.map(|_| self.context.device.allocated_bytes()),
             "reference_standard_error": self.arguments.reference.then_some(self.worst_error),
@@ -324,12 +326,6 @@ impl<'a> Rendering<'a> {
             "baked": frame.map(|frame| &frame.buffers.baked),
             "frames": pictures.collect::<Vec<_>>(),
         })
-    }
-
-    /// Every light, and how it is computed.
-    fn lights(&self) -> Vec<serde_json::Value> {
-        let listed = light::listed(self.scene, self.options.lights);
-        listed.into_iter().map(|(name, form)| json!({ "name": name, "form": form.name() })).collect()
     }
 
     /// One line for people.

@@ -28,8 +28,7 @@ impl Case {
         } else if scene.environment.is_none() && !scene.entities.iter().any(|e| e.emits) {
             "nothing shines: there is no [environment], and no entity emits"
         } else {
-            let name =
-                path.file_stem().map_or_else(|| path.display().to_string(), |name| name.to_string_lossy().into());
+            let name = path.file_stem().unwrap_or(path.as_os_str()).to_string_lossy().into_owned();
             let time_s = scene.data.output.time_s;
             return Ok(Case { time_s, ..Case::at_start(name, scene) });
         };

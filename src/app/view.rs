@@ -343,7 +343,7 @@ impl Shown {
             WindowEvent::Focused(false) => self.viewer.event(Event::Lost),
             WindowEvent::CursorMoved { position, .. } => {
                 self.pointer = [position.x as f32, position.y as f32];
-                if response.consumed && !self.viewer.is_dragging() {
+                if response.consumed && !self.viewer.input.is_dragging() {
                     return Ok(());
                 }
                 self.viewer.event(Event::Move(self.pointer))

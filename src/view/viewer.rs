@@ -83,7 +83,7 @@ pub(super) enum Leave {
 pub struct Viewer {
     pub(super) setup: Setup,
     pub editor: Editor,
-    pub(super) input: Input,
+    pub input: Input,
     pub(super) baker: Baker,
     /// The frame, once its fields are baked.
     pub frame: Option<Frame>,
@@ -172,11 +172,6 @@ impl Viewer {
         viewer.follow(Changed { scene: true, ..Changed::default() })?;
         viewer.catch_up()?;
         Ok(viewer)
-    }
-
-    /// Whether the pointer drags the scene or an entity.
-    pub fn is_dragging(&self) -> bool {
-        self.input.is_dragging()
     }
 
     /// Whether a background bake is running, or may have to.

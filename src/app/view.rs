@@ -198,8 +198,8 @@ struct App<'a> {
 impl App<'_> {
     fn open(&mut self, events: &ActiveEventLoop, scene: Scene) -> Result<Shown> {
         let device = &self.context.device;
-        let [width, height] =
-            self.arguments.options.size.unwrap_or([scene.data.output.width, scene.data.output.height]);
+        let options = self.arguments.options.frame(&scene)?;
+        let [width, height] = options.size;
         let attributes = winit::window::Window::default_attributes()
             .with_title(title(&self.arguments.scene))
             .with_inner_size(PhysicalSize::new(width, height))
@@ -213,7 +213,7 @@ impl App<'_> {
             options: self.device_options.clone(),
             library: self.context.baker.library().clone(),
             cache: self.context.cache.clone(),
-            frame: frame::Options { size: own, antialias, ..self.arguments.options.frame(&scene)? },
+            frame: frame::Options { size: own, antialias, ..options },
             refines: self.arguments.options.antialias.is_none() && antialias != Antialias::Samples,
             format: target.format(),
             seed: self.global.seed,

@@ -13,7 +13,6 @@ use crate::truth::receiver_vertices;
 use glam::{DVec3, Vec3};
 use serde::Serialize;
 use std::f64::consts::PI;
-use std::fmt::Write;
 use std::path::Path;
 use std::sync::Arc;
 
@@ -250,13 +249,12 @@ fn crowd(count: usize, distinct: bool) -> Result<Scene> {
     let mut rng = fastrand::Rng::with_seed(5);
     let mut entities = FLOOR.to_owned();
     for _ in 0..count {
-        let mut x = 0.4;
-        let mut y = 1.1;
-        let mut z = 0.2;
-        if distinct {
-            (x, y, z) = (4.0 * rng.f64() - 2.0, 0.7 + 3.0 * rng.f64(), 4.0 * rng.f64() - 2.0);
-        }
-        let _ = write!(entities, "{}", entity("ball", &format!("position = [{x}, {y}, {z}]\nreceives = false")));
+        let [x, y, z] = if distinct {
+            [4.0 * rng.f64() - 2.0, 0.7 + 3.0 * rng.f64(), 4.0 * rng.f64() - 2.0]
+        } else {
+            [0.4, 1.1, 0.2]
+        };
+        entities += &entity("ball", &format!("position = [{x}, {y}, {z}]\nreceives = false"));
     }
     scene(6, GRADIENT, &entities)
 }

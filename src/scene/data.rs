@@ -50,7 +50,7 @@ use glam::Vec3;
 use serde::{Deserialize, Serialize};
 
 use super::gloss::{Gloss, Maps};
-use super::light::Spot;
+use super::light::{self, Spot};
 use super::motion::{Motion, Placement, PlacementF64, RotationData};
 use super::{check_counts, values};
 use crate::asset::environment::EnvironmentData;
@@ -428,6 +428,7 @@ pub struct EntityData {
     #[serde(default, deserialize_with = "values::radiance")]
     pub emission: Vec3,
     /// Makes its light a spot along its own +y.
+    #[serde(default, deserialize_with = "light::checked")]
     pub spot: Option<Spot>,
     /// Whether it lights others. By default it does if it has emission.
     pub emits: Option<bool>,

@@ -21,31 +21,24 @@ pub enum Lights {
 
 /// The cone of a spot about its entity's own +y.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields, try_from = "SpotWritten")]
+#[serde(deny_unknown_fields)]
 pub struct Spot {
     /// Within this angle to the axis it shines in full, degrees, 0 to `outer_deg`.
+    #[serde(default)]
     pub inner_deg: f32,
     /// Beyond this angle it is dark, degrees, up to 90.
     pub outer_deg: f32,
 }
 
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-struct SpotWritten {
-    #[serde(default)]
-    inner_deg: f32,
-    outer_deg: f32,
-}
-
-impl TryFrom<SpotWritten> for Spot {
-    type Error = String;
-
-    fn try_from(SpotWritten { inner_deg, outer_deg }: SpotWritten) -> Result<Self, String> {
-        if !(outer_deg > 0.0 && outer_deg <= 90.0 && (0.0..=outer_deg).contains(&inner_deg)) {
-            return Err(format!("the angles {inner_deg} and {outer_deg} of a spot are not 0 <= inner <= outer <= 90"));
-        }
-        Ok(Spot { inner_deg, outer_deg })
+/// Reads a spot and checks its angles.
+pub(super) fn checked<'de, D: serde::Deserializer<'de>>(source: D) -> Result<Option<Spot>, D::Error> {
+    let spot = Spot::deserialize(source)?;
+    let Spot { inner_deg: inner, outer_deg: outer } = spot;
+    if !(outer > 0.0 && outer <= 90.0 && (0.0..=outer).contains(&inner)) {
+        let what = format!("the angles {inner} and {outer} of a spot are not 0 <= inner <= outer <= 90");
+        return Err(serde::de::Error::custom(what));
     }
+    Ok(Some(spot))
 }
 
 impl Spot {

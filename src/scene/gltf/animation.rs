@@ -27,13 +27,6 @@ pub struct Tracks {
     pub weights: Vec<Keys<[f32; 1]>>,
 }
 
-impl Tracks {
-    /// Whether they move the node itself.
-    pub fn move_the_node(&self) -> bool {
-        self.position.is_some() || self.rotation.is_some() || self.scale.is_some()
-    }
-}
-
 /// A channel before its numbers become values.
 struct Channel {
     place: String,

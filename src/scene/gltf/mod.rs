@@ -176,15 +176,14 @@ impl Primitive {
 
     fn is_cut_into_concave_solids(&self) -> bool {
         let numbers = self.pieces();
-        self.surface.is_solid() && pieces::any_concave(self.shape.positions(), self.shape.triangles(), numbers)
+        self.surface.is_solid() && pieces::any_concave(&self.shape.positions, &self.shape.triangles, numbers)
     }
 
     /// The number of the piece that each triangle belongs to. Surfaces that let light through stay whole, and so do the
     /// many cards of a plant, and what glows in a pattern.
     fn pieces(&self) -> &[u32] {
         self.pieces.get_or_init(|| {
-            let positions = self.shape.positions();
-            let triangles = self.shape.triangles();
+            let Shape { positions, triangles, .. } = &self.shape;
             match &self.surface {
                 surface if surface.is_solid() => pieces::solids(positions, triangles),
                 surface if surface.is_lamp() => pieces::lamps(positions, triangles),
@@ -381,7 +380,7 @@ impl Reader {
                 if primitive.surface.opacity < 1.0 || primitive.surface.has_alpha() {
                     continue;
                 }
-                if surfaces.len() + primitive.shape.triangle_count() > backs::TRIANGLES_LIMIT {
+                if surfaces.len() + primitive.shape.triangles.len() > backs::TRIANGLES_LIMIT {
                     return Ok(self.onlookers.entry(key).or_insert(None).clone());
                 }
                 let corners = primitive.shape.corners(place);
@@ -587,7 +586,7 @@ impl Builder {
             let Primitive { shape, surface, .. } = &*primitive;
             let stand = &placed.stand;
             let rests = stand.motion.is_empty() && placed.part.pose.is_none();
-            let is_small = shape.triangle_count() <= SMALL_TRIANGLES;
+            let is_small = shape.triangles.len() <= SMALL_TRIANGLES;
             let is_flat = SplitTransform::new(stand.rest.matrix3).is_none();
             if rests && surface.is_solid() && is_small && !is_flat {
                 let (centre, radius_m) = shape.sphere(stand.rest);
@@ -596,7 +595,7 @@ impl Builder {
                     kind: (primitive.material, surface.paint.is_some(), surface.attributes.kinds()),
                     centre,
                     radius_m,
-                    triangle_count: shape.triangle_count(),
+                    triangle_count: shape.triangles.len(),
                 });
             }
         }

@@ -142,11 +142,7 @@ pub fn lamps(positions: &[Vec3], triangles: &[[u32; 3]]) -> Vec<u32> {
     } else {
         pieces.iter().for_each(|piece| unbend(positions, triangles, piece, HALVINGS, &mut lamps));
     }
-    if lamps.len() <= LAMPS_LIMIT {
-        number(&mut numbers, &lamps);
-    } else {
-        number(&mut numbers, &pieces);
-    }
+    number(&mut numbers, if lamps.len() <= LAMPS_LIMIT { &lamps } else { &pieces });
     numbers
 }
 

@@ -18,9 +18,9 @@ use crate::error::Result;
 /// as the specification demands.
 pub struct Shape {
     pub place: String,
-    positions: Vec<Vec3>,
+    pub positions: Vec<Vec3>,
     normals: Vec<Vec3>,
-    triangles: Vec<[u32; 3]>,
+    pub triangles: Vec<[u32; 3]>,
     /// The element of the accessors that each vertex has.
     source: Vec<u32>,
     attributes: HashMap<Semantic, usize>,
@@ -183,18 +183,6 @@ impl Shape {
         }
         let at = |element: &u32, k: usize| if k < stored { numbers[*element as usize * stored + k] } else { 1.0 };
         Ok(Some(self.source.iter().flat_map(|element| (0..width).map(move |k| at(element, k))).collect()))
-    }
-
-    pub fn positions(&self) -> &[Vec3] {
-        &self.positions
-    }
-
-    pub fn triangles(&self) -> &[[u32; 3]] {
-        &self.triangles
-    }
-
-    pub fn triangle_count(&self) -> usize {
-        self.triangles.len()
     }
 
     /// Centre and radius of a sphere around it where it stands.

@@ -119,7 +119,8 @@ pub fn stands(document: &Document, tracks: &[Option<Tracks>], notes: &mut Notes)
         if depth > DEPTH_LIMIT {
             return Err(document.fail(place, format!("over the limit of {DEPTH_LIMIT} nodes in one another")));
         }
-        let moves = tracks[index].as_ref().filter(|t| t.position.is_some() || t.rotation.is_some() || t.scale.is_some());
+        let moves =
+            tracks[index].as_ref().filter(|t| t.position.is_some() || t.rotation.is_some() || t.scale.is_some());
         let stand = placed(document, index, &outer, moves, notes)?;
         let key_count = |motion: &Motion| if let Motion::Node(node) = motion { node.times_s().count() } else { 0 };
         keys += stand.motion.iter().map(|motion| 1 + key_count(motion)).sum::<usize>();

@@ -41,7 +41,7 @@ pub struct Mesh {
     radius_m: f32,
     shape: topology::Topology,
     content_hash: [u8; 32],
-    panel: Option<LampFace>,
+    pub(super) panel: Option<LampFace>,
     rectangle: Option<Rectangle>,
     cuboid: Option<Cuboid>,
     boxes: Vec<PlacedCuboid>,
@@ -374,10 +374,6 @@ impl Mesh {
         let placed =
             |cuboid| PlacedCuboid { centre_m: self.centre.as_dvec3(), radius_m: f64::from(self.radius_m), cuboid };
         self.cuboid.map_or_else(|| self.boxes.clone(), |cuboid| vec![placed(cuboid)])
-    }
-
-    pub(super) fn with_panel(self, panel: LampFace) -> Self {
-        Mesh { panel: Some(panel), ..self }
     }
 
     /// Whether a point is within the mesh, which is closed.

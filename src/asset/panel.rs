@@ -17,8 +17,9 @@ const SEGMENTS: u32 = 64;
 fn lamp(name: &str, body: Mesh, panel: LampFace) -> Result<Mesh> {
     let color = |normal: &Vec3| if normal.y > 0.5 { Vec3::ONE } else { Vec3::ZERO };
     let colors = body.normals.iter().map(color).collect();
-    let mesh = Mesh::new(name, body.positions, body.normals, Some(colors), body.triangles)?;
-    Ok(mesh.with_panel(panel))
+    let mut mesh = Mesh::new(name, body.positions, body.normals, Some(colors), body.triangles)?;
+    mesh.panel = Some(panel);
+    Ok(mesh)
 }
 
 /// A disc of `radius_m` around the origin, which shines towards +y.

@@ -23,7 +23,7 @@ impl Frame {
         let look = |entity: &Entity| (entity.gloss.is_some(), entity.maps);
         let same_looks = scene.entities.iter().map(look).eq(self.scene.entities.iter().map(look));
         same_looks
-            && self.scene.is_boxed_like(scene)
+            && self.scene.boxed == scene.boxed
             && self.groups == groups
             && self.surfaces.keys() == surfaces.keys()
             && self.buffers.cover_fields(scene, self.options.lights, &groups)

@@ -63,7 +63,7 @@ pub struct Scene {
     /// What textures leave of meshes in which they make holes.
     casters: HashMap<usize, Arc<Mesh>>,
     /// Meshes that block sharp lights as their boxes.
-    boxed: BTreeSet<usize>,
+    pub(crate) boxed: BTreeSet<usize>,
     /// Entities in the file's order, with their switches resolved, and then suns. [`Scene::at`] gives their placements.
     pub entities: Vec<Entity>,
     /// The surface of each entity ([`Scene::surface`]); empty where all are the meshes themselves.
@@ -309,11 +309,6 @@ impl Scene {
     pub(crate) fn casts_as_boxes(&self, entity: usize) -> bool {
         let Entity { mesh, occludes, emits, transparent, opacity, .. } = self.entities[entity];
         occludes && !emits && !transparent && opacity >= 1.0 && self.boxed.contains(&mesh)
-    }
-
-    /// Whether the same meshes block sharp lights as their boxes in another scene.
-    pub(crate) fn is_boxed_like(&self, other: &Scene) -> bool {
-        self.boxed == other.boxed
     }
 
     /// Whether an entity is a closed surface that lets light through.

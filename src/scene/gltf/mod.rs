@@ -50,7 +50,7 @@ use std::path::{Path, PathBuf};
 use std::rc::Rc;
 use std::sync::Arc;
 
-use glam::{DAffine3, DMat3, DQuat, Vec3};
+use glam::{DMat3, DQuat, Vec3};
 
 use crate::asset::Mesh;
 use crate::asset::environment::{EnvironmentData, RADIANCE_LIMIT};
@@ -138,21 +138,13 @@ pub fn load_mesh(path: &Path) -> Result<(Mesh, Notes)> {
     let document = Document::load(path)?;
     let mut notes = Notes::default();
     notes.leave_out_many("animations (the mesh is as it stands at rest)", document.root.animations.len());
-    let none = vec![None; document.root.nodes.len()];
-    let stands = tree::stands(&document, &none, &mut notes)?;
+    let tracks = vec![None; document.root.nodes.len()];
+    let stage = Stage { stands: tree::stands(&document, &tracks, &mut notes)?, tracks };
     let mut joined = Joined::default();
-    for stand in &stands {
-        let pose = pose::is_posed(&document, stand.node, None)
-            .then(|| Pose::at(&document, stand.node, &stands, None, 0.0))
-            .transpose()?;
-        // A skin's vertices are in the world.
-        let is_skinned = pose.as_ref().is_some_and(|pose| !pose.joints.is_empty());
-        let place = if is_skinned { DAffine3::IDENTITY } else { stand.rest };
-        let Some(mesh) = document.root.nodes[stand.node].mesh.map(|mesh| mesh.value()) else { continue };
-        for at in 0..document.root.meshes[mesh].primitives.len() {
-            let Some(shape) = Shape::read(&document, mesh, at, pose.as_ref(), &mut notes)? else { continue };
-            joined.add(&document, &shape, place, &Attributes::default())?;
-        }
+    for Placed { stand, part: Part { mesh, at, pose, .. }, .. } in stage.parts(&document, 0.0) {
+        let pose = pose.map(|_| Pose::at(&document, stand.node, &stage.stands, None, 0.0)).transpose()?;
+        let Some(shape) = Shape::read(&document, mesh, at, pose.as_ref(), &mut notes)? else { continue };
+        joined.add(&document, &shape, stand.rest, &Attributes::default())?;
     }
     let name = path.file_stem().unwrap_or_default().to_string_lossy();
     let mesh = joined.mesh(&name).map_err(|error| error.context(path.display()))?;
@@ -229,6 +221,29 @@ fn mesh_key(part: Part, bend: DMat3) -> MeshKey {
 struct Stage {
     stands: Vec<Stand>,
     tracks: Vec<Option<Tracks>>,
+}
+
+impl Stage {
+    fn is_posed(&self, document: &Document, node: usize) -> bool {
+        pose::is_posed(document, node, self.tracks[node].as_ref())
+    }
+
+    /// All primitives, those of meshes with a pose in that of `time_s`.
+    fn parts(&self, document: &Document, time_s: f64) -> Vec<Placed> {
+        let mut parts = Vec::new();
+        for (place, stand) in self.stands.iter().enumerate() {
+            let node = &document.root.nodes[stand.node];
+            let Some(mesh) = node.mesh.map(|mesh| mesh.value()) else { continue };
+            let pose = self.is_posed(document, stand.node).then_some(PoseData { node: stand.node, time_s });
+            // A skin's vertices are in the world.
+            let in_world = node.skin.map(|_| Stand { node: stand.node, ..Stand::default() });
+            let stand = in_world.as_ref().unwrap_or(stand);
+            for at in 0..document.root.meshes[mesh].primitives.len() {
+                parts.push(Placed { place, stand: stand.clone(), part: Part { mesh, at, pose, piece: None } });
+            }
+        }
+        parts
+    }
 }
 
 /// Primitives and images of a file, each read once.
@@ -364,31 +379,22 @@ impl Reader {
         let document = self.document.clone();
         let stage = self.stage()?;
         let mut surfaces = Vec::new();
-        for stand in &stage.stands {
-            let node = &document.root.nodes[stand.node];
-            let Some(mesh) = node.mesh.map(|mesh| mesh.value()) else { continue };
-            let is_posed = pose::is_posed(&document, stand.node, stage.tracks[stand.node].as_ref());
-            let pose = time_s.filter(|_| is_posed).map(|time_s| PoseData { node: stand.node, time_s });
-            if is_posed && pose.is_none() {
+        let parts = stage.parts(&document, time_s.unwrap_or_default());
+        for Placed { stand, part, .. } in parts.iter().filter(|of| time_s.is_some() || of.part.pose.is_none()) {
+            // A primitive that cannot be read is refused where it is wanted.
+            let Ok(Some(primitive)) = self.primitive(*part) else { continue };
+            if primitive.surface.opacity < 1.0 || primitive.surface.has_alpha() {
                 continue;
             }
-            // A skin's vertices are in the world.
-            let place = if node.skin.is_some() { DAffine3::IDENTITY } else { stand.rest };
-            for at in 0..document.root.meshes[mesh].primitives.len() {
-                // A primitive that cannot be read is refused where it is wanted.
-                let Ok(Some(primitive)) = self.primitive(Part { mesh, at, pose, piece: None }) else { continue };
-                if primitive.surface.opacity < 1.0 || primitive.surface.has_alpha() {
-                    continue;
-                }
-                if surfaces.len() + primitive.shape.triangles.len() > backs::TRIANGLES_LIMIT {
-                    return Ok(self.onlookers.entry(key).or_insert(None).clone());
-                }
-                let corners = primitive.shape.corners(place);
-                let owners = primitive.pieces().iter().map(|piece| Owner { primitive: [mesh, at], piece: *piece });
-                // Others are refused as well.
-                let is_in_range = |corner: &Vec3| corner.abs().cmple(Vec3::splat(POSITION_LIMIT_M)).all();
-                surfaces.extend(owners.zip(corners).filter(|(_, corners)| corners.iter().all(is_in_range)));
+            if surfaces.len() + primitive.shape.triangles.len() > backs::TRIANGLES_LIMIT {
+                return Ok(self.onlookers.entry(key).or_insert(None).clone());
             }
+            let corners = primitive.shape.corners(stand.rest);
+            let owners =
+                primitive.pieces().iter().map(|piece| Owner { primitive: [part.mesh, part.at], piece: *piece });
+            // Others are refused as well.
+            let is_in_range = |corner: &Vec3| corner.abs().cmple(Vec3::splat(POSITION_LIMIT_M)).all();
+            surfaces.extend(owners.zip(corners).filter(|(_, corners)| corners.iter().all(is_in_range)));
         }
         let is_camera = |stand: &&Stand| document.root.nodes[stand.node].camera.is_some();
         let cameras: Vec<Vec3> =
@@ -492,33 +498,20 @@ impl Builder {
     fn build(mut self) -> Result<Import> {
         let document = self.reader.document.clone();
         let stage = self.reader.stage()?;
-        let mut parts = Vec::new();
+        let time_s = self.options.time_s;
         let mut posed = 0;
-        for (place, stand) in stage.stands.iter().enumerate() {
-            let node = &document.root.nodes[stand.node];
-            let Some(mesh) = node.mesh.map(|mesh| mesh.value()) else { continue };
-            let tracks = stage.tracks[stand.node].as_ref();
-            let pose = pose::is_posed(&document, stand.node, tracks)
-                .then_some(PoseData { node: stand.node, time_s: self.options.time_s });
-            // A skin's vertices are in the world.
-            let in_world = node.skin.map(|_| Stand { fixed: DAffine3::IDENTITY, motion: Vec::new(), ..stand.clone() });
-            let stand = in_world.unwrap_or_else(|| stand.clone());
-            if pose.is_some() {
-                posed += 1;
-                let follows = |node: usize| stage.stands.iter().any(|s| s.node == node && !s.motion.is_empty());
-                let joints = node.skin.iter().flat_map(|skin| &document.root.skins[skin.value()].joints);
-                let moves = joints.map(|joint| joint.value()).any(follows);
-                if moves || tracks.is_some_and(|tracks| !tracks.weights.is_empty()) {
-                    self.reader.notes.leave_out(POSES);
-                }
-            }
-            for at in 0..document.root.meshes[mesh].primitives.len() {
-                parts.push(Placed { place, stand: stand.clone(), part: Part { mesh, at, pose, piece: None } });
+        for stand in stage.stands.iter().filter(|stand| stage.is_posed(&document, stand.node)) {
+            posed += 1;
+            let skin = document.root.nodes[stand.node].skin.iter();
+            let joints = skin.flat_map(|skin| &document.root.skins[skin.value()].joints);
+            let follows = |node: usize| stage.stands.iter().any(|s| s.node == node && !s.motion.is_empty());
+            let moves = joints.map(|joint| joint.value()).any(follows);
+            if moves || stage.tracks[stand.node].as_ref().is_some_and(|tracks| !tracks.weights.is_empty()) {
+                self.reader.notes.leave_out(POSES);
             }
         }
-        let entities = self.entities(parts)?;
+        let entities = self.entities(stage.parts(&document, time_s))?;
         if posed > 0 {
-            let time_s = self.options.time_s;
             self.reader.notes.say(format!("skins and morph targets ({posed}) stand in their pose at {time_s} s"));
         }
         self.finish(&stage.stands, entities)

@@ -28,7 +28,7 @@ const SAME: f64 = 1e-5;
 const UNIT: f64 = 0.005;
 
 /// Where a node stands.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub struct Stand {
     pub node: usize,
     /// What stands still about it, from its own space to that of the moving node that carries it, or to the world.
@@ -107,8 +107,8 @@ pub fn stands(document: &Document, tracks: &[Option<Tracks>], notes: &mut Notes)
         }
     };
     notes.leave_out_many("further scenes", root.scenes.len().saturating_sub(1));
-    let world = Stand { node: 0, fixed: DAffine3::IDENTITY, motion: Vec::new(), rest: DAffine3::IDENTITY };
-    let mut open: Vec<(usize, usize, Stand)> = roots.into_iter().rev().map(|node| (node, 1, world.clone())).collect();
+    let mut open: Vec<(usize, usize, Stand)> =
+        roots.into_iter().rev().map(|node| (node, 1, Stand::default())).collect();
     let mut out = Vec::new();
     let mut keys = 0;
     while let Some((index, depth, outer)) = open.pop() {

@@ -37,20 +37,6 @@ pub fn texels(mesh: &Mesh) -> f64 {
     if mesh.triangles.len() >= FROM_TRIANGLES { TEXEL_SHARE } else { 0.0 }
 }
 
-/// The sphere around a group, and the distance by which its simplified triangles miss it, in r.
-#[derive(Clone, Copy, Debug)]
-struct GroupBounds {
-    centre: Vec3,
-    radius: f32,
-    error: f32,
-}
-
-impl From<ClodBounds> for GroupBounds {
-    fn from(bounds: ClodBounds) -> Self {
-        GroupBounds { centre: bounds.center.into(), radius: bounds.radius, error: bounds.error }
-    }
-}
-
 /// The distance by which drawn triangles may miss the mesh.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Tolerance {
@@ -66,10 +52,10 @@ impl Tolerance {
     }
 
     /// Whether a group may not be drawn simplified.
-    fn forbids(&self, bounds: &GroupBounds) -> bool {
+    fn forbids(&self, bounds: &ClodBounds) -> bool {
         match *self {
             Tolerance::Eye(eye, share) => {
-                bounds.error > share * (eye.distance(bounds.centre) - bounds.radius).clamp(0.0, FARTHEST)
+                bounds.error > share * (eye.distance(bounds.center.into()) - bounds.radius).clamp(0.0, FARTHEST)
             }
             Tolerance::Parallel(most) => bounds.error > most,
         }
@@ -77,7 +63,8 @@ impl Tolerance {
 }
 
 struct Group {
-    bounds: GroupBounds,
+    /// The sphere around it, and the distance by which its simplified triangles miss it, in r.
+    bounds: ClodBounds,
     siblings: Range<usize>,
 }
 
@@ -126,51 +113,48 @@ pub(super) struct Leveled {
 }
 
 impl Leveled {
+    /// Cuts a mesh into chunks of neighbouring triangles, for all of its levels.
     pub fn new(mesh: &Mesh) -> Result<Self> {
-        let (chunked, levels) = leveled(&unit_positions(mesh), &distinct(mesh))?;
-        Ok(Leveled { chunked, levels })
+        let positions = unit_positions(mesh);
+        let adapter = adapter(&positions)?;
+        // Vertices at one place become one, so that no group has a rim where only normals differ.
+        let same = meshopt::generate_position_remap(&adapter);
+        let triangles = distinct(mesh);
+        let welded = triangles.iter().map(|t| t.map(|vertex| same[vertex as usize]));
+        let welded: Vec<u32> = welded.filter(|[a, b, c]| a != b && b != c && c != a).flatten().collect();
+        let config = ClodConfig {
+            partition_size: GROUP_CHUNKS,
+            partition_sort: true,
+            optimize_clusters: false,
+            // It may tear a surface that stays whole otherwise.
+            simplify_fallback_sloppy: false,
+            ..clod_default_config(CHUNK_TRIANGLES)
+        };
+        let mut chunked = Chunked::default();
+        let mut siblings = Vec::new();
+        let mut groups = Vec::new();
+        clod_build(config, &ClodMesh::new(&welded, &adapter), |group, clusters| {
+            let first = siblings.len();
+            for alike in clusters.chunk_by(|a, b| a.refined == b.refined) {
+                let start = chunked.chunks.len() as u32;
+                alike.iter().for_each(|cluster| chunked.add(&positions, cluster.indices));
+                let chunks = start..chunked.chunks.len() as u32;
+                siblings.push(Siblings { from: usize::try_from(alike[0].refined).ok(), chunks });
+            }
+            groups.push(Group { bounds: group.simplified, siblings: first..siblings.len() });
+            groups.len() as i32 - 1
+        });
+        let indices = chunked.triangles.as_flattened().to_vec();
+        Ok(Leveled { chunked, levels: Levels { groups, siblings, indices } })
     }
 
-    /// Triangles that miss the mesh by at most `error`, in r, by their corners among its vertices.
-    pub fn within(&self, error: f64) -> Vec<[u32; 3]> {
+    /// Triangles that are drawn under a tolerance, by their corners among the mesh's vertices.
+    pub fn drawn(&self, tolerance: Tolerance) -> Vec<[u32; 3]> {
         let mut chosen = Vec::new();
-        self.levels.choose(Tolerance::Parallel(error as f32), &mut chosen);
+        self.levels.choose(tolerance, &mut chosen);
         let drawn = chosen.into_iter().flatten().flat_map(|chunk| self.chunked.triangles_of(chunk as usize));
         drawn.map(|triangle| triangle.map(|vertex| self.chunked.vertices[vertex as usize])).collect()
     }
-}
-
-/// Cuts a mesh into chunks of neighbouring triangles, for all of its levels.
-fn leveled(positions: &[Vec3], triangles: &[[u32; 3]]) -> Result<(Chunked, Levels)> {
-    let adapter = adapter(positions)?;
-    // Vertices at one place become one, so that no group has a rim where only normals differ.
-    let same = meshopt::generate_position_remap(&adapter);
-    let welded = triangles.iter().map(|t| t.map(|vertex| same[vertex as usize]));
-    let welded: Vec<u32> = welded.filter(|[a, b, c]| a != b && b != c && c != a).flatten().collect();
-    let config = ClodConfig {
-        partition_size: GROUP_CHUNKS,
-        partition_sort: true,
-        optimize_clusters: false,
-        // It may tear a surface that stays whole otherwise.
-        simplify_fallback_sloppy: false,
-        ..clod_default_config(CHUNK_TRIANGLES)
-    };
-    let mut chunked = Chunked::default();
-    let mut siblings = Vec::new();
-    let mut groups = Vec::new();
-    clod_build(config, &ClodMesh::new(&welded, &adapter), |group, clusters| {
-        let first = siblings.len();
-        for alike in clusters.chunk_by(|a, b| a.refined == b.refined) {
-            let start = chunked.chunks.len() as u32;
-            alike.iter().for_each(|cluster| chunked.add(positions, cluster.indices));
-            let chunks = start..chunked.chunks.len() as u32;
-            siblings.push(Siblings { from: usize::try_from(alike[0].refined).ok(), chunks });
-        }
-        groups.push(Group { bounds: group.simplified.into(), siblings: first..siblings.len() });
-        groups.len() as i32 - 1
-    });
-    let indices = chunked.triangles.as_flattened().to_vec();
-    Ok((chunked, Levels { groups, siblings, indices }))
 }
 
 #[cfg(test)]
@@ -196,14 +180,7 @@ mod tests {
     fn chunks_of_all_levels_fit_together() {
         for mesh in [bumpy(), generate::torus(1.0, 0.4, 120, 60)] {
             let unit = unit_positions(&mesh);
-            let (chunked, levels) = leveled(&unit, &mesh.triangles).unwrap();
-            let drawn = |tolerance: Tolerance| {
-                let mut chosen = Vec::new();
-                levels.choose(tolerance, &mut chosen);
-                let of = |chunk: u32| chunked.triangles_of(chunk as usize).to_vec();
-                let triangles: Vec<[u32; 3]> = chosen.into_iter().flatten().flat_map(of).collect();
-                triangles.iter().map(|t| t.map(|vertex| chunked.vertices[vertex as usize])).collect::<Vec<_>>()
-            };
+            let leveled = Leveled::new(&mesh).unwrap();
             let mut rng = fastrand::Rng::with_seed(5);
             let mut tolerances = [0.0, 1e-4, 1e-3, 1e-2, 0.1].map(Tolerance::Parallel).to_vec();
             for (away, i) in [2e-3, 0.1, 0.4, 1.0, 3.0, 8.0].into_iter().zip((0..unit.len()).step_by(unit.len() / 6)) {
@@ -212,7 +189,7 @@ mod tests {
             }
             let mut fewest = usize::MAX;
             for tolerance in tolerances {
-                let triangles = drawn(tolerance);
+                let triangles = leveled.drawn(tolerance);
                 fewest = fewest.min(triangles.len());
                 let place = |vertex: u32| unit[vertex as usize].to_array().map(f32::to_bits);
                 let mut sides = HashMap::new();
@@ -224,7 +201,8 @@ mod tests {
                 let whole = sides.iter().all(|((a, b), count)| sides.get(&(*b, *a)) == Some(count));
                 assert!(whole, "{}: gaps under {tolerance:?}", mesh.name);
             }
-            assert_eq!(drawn(Tolerance::Parallel(0.0)).len(), mesh.triangles.len(), "nothing may be missed");
+            let all = leveled.drawn(Tolerance::Parallel(0.0));
+            assert_eq!(all.len(), mesh.triangles.len(), "nothing may be missed");
             assert!(20 * fewest < mesh.triangles.len(), "{fewest} of {} triangles at least", mesh.triangles.len());
         }
     }

@@ -263,7 +263,8 @@ fn drawn_triangles<'m>(
     }
     let edges = frames.iter().map(|frame| 2.0 * frame.half.min_element());
     let pixel = edges.fold(f64::INFINITY, f64::min) / f64::from(header.view_px);
-    Ok(Cow::Owned(baker.leveled(mesh)?.within(header.level_pixels * pixel)))
+    let tolerance = levels::Tolerance::Parallel((header.level_pixels * pixel) as f32);
+    Ok(Cow::Owned(baker.leveled(mesh)?.drawn(tolerance)))
 }
 
 /// Bakes the silhouette field of a mesh; `progress` hears of maps. Returns the report of the bake too.

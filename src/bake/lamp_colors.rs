@@ -92,8 +92,7 @@ fn view(mesh: &Mesh, blockers: &Blockers, toward: DVec3, sine: f64) -> View {
         (aside + (1.0 - aside.length_squared()).sqrt() * toward).as_vec3a()
     };
     let directions: Vec<Vec3A> = places.iter().map(direction).collect();
-    let mut hits = Vec::new();
-    blockers.first(eye.as_vec3a(), &Mat3A::IDENTITY, &directions, &[true], &mut hits);
+    let hits = blockers.first(eye.as_vec3a(), &Mat3A::IDENTITY, &directions, &[true]);
     let mut met: Vec<(DVec3, DVec3)> = Vec::new();
     for ((place, direction), hit) in places.iter().zip(&directions).zip(&hits) {
         let Some(hit) = hit else { continue };

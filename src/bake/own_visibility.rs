@@ -350,9 +350,7 @@ struct Caster<'c> {
 impl Caster<'_> {
     /// What rays meet of the members that block.
     fn cast(&self, locals: &[Vec3A]) -> Vec<Option<BlockerHit>> {
-        let mut hits = Vec::with_capacity(locals.len());
-        self.blockers.first(self.origin, &self.to_blockers, locals, self.counts.blocks, &mut hits);
-        hits
+        self.blockers.first(self.origin, &self.to_blockers, locals, self.counts.blocks)
     }
 
     /// The front that a ray meets, if it meets one. `weight`: cosine to the normal times solid angle.
@@ -404,9 +402,7 @@ impl Caster<'_> {
     /// How far each ray comes past all that the map counts; infinity where it is free.
     fn map_distances(&self, locals: &[Vec3A]) -> Vec<f32> {
         let in_map = self.counts.in_map.expect("asked for maps alone");
-        let mut hits = Vec::with_capacity(locals.len());
-        self.blockers.first_of(self.origin, &self.to_blockers, locals, in_map, &mut hits);
-        hits.iter().map(distance).collect()
+        self.blockers.first_of(self.origin, &self.to_blockers, locals, in_map).iter().map(distance).collect()
     }
 
     /// The same of rays whose first hits are known: only those that meet what the map does not count are cast again.
@@ -745,8 +741,7 @@ mod tests {
                 near: 0.0,
             };
             let directions: Vec<Vec3A> = lattice(40_000).filter(|d| d.y > 0.0).map(|d| d.as_vec3a()).collect();
-            let mut hits = Vec::new();
-            blockers.first(eye.origin.into(), &Mat3A::IDENTITY, &directions, &[true], &mut hits);
+            let hits = blockers.first(eye.origin.into(), &Mat3A::IDENTITY, &directions, &[true]);
             let wanted: f64 =
                 directions.iter().zip(&hits).filter(|(_, hit)| hit.is_some()).map(|(d, _)| f64::from(d.y)).sum();
             let wanted = wanted / directions.iter().map(|d| f64::from(d.y)).sum::<f64>();

@@ -268,15 +268,15 @@ struct Cast<'c> {
     turn: &'c Mat3A,
     directions: &'c [Vec3A],
     asked: Asked<'c>,
-    hits: &'c mut Vec<Option<BlockerHit>>,
 }
 
 impl WithSimd for Cast<'_> {
-    type Output = ();
+    type Output = Vec<Option<BlockerHit>>;
 
     #[inline(always)]
-    fn with_simd<S: Simd>(self, simd: S) {
-        let Cast { blockers, origin, turn, directions, asked, hits } = self;
+    fn with_simd<S: Simd>(self, simd: S) -> Self::Output {
+        let Cast { blockers, origin, turn, directions, asked } = self;
+        let mut hits = Vec::with_capacity(directions.len());
         let mut open = Vec::with_capacity(64);
         for rays in directions.chunks(LANES) {
             let mut packet = Packet::new(turn, rays);
@@ -296,6 +296,7 @@ impl WithSimd for Cast<'_> {
                 hits.push(blockers.hit(&packet, lane));
             }
         }
+        hits
     }
 }
 
@@ -408,29 +409,21 @@ impl Blockers {
         }
     }
 
-    /// Adds the first triangle on each ray of those whose members count. `turn` brings the directions into the triangles'
+    /// The first triangle on each ray of those whose members count. `turn` brings the directions into the triangles'
     /// frame.
-    pub fn first(
-        &self,
-        origin: Vec3A,
-        turn: &Mat3A,
-        directions: &[Vec3A],
-        counts: &[bool],
-        hits: &mut Vec<Option<BlockerHit>>,
-    ) {
-        Arch::new().dispatch(Cast { blockers: self, origin, turn, directions, asked: Asked::Counted(counts), hits });
+    pub fn first(&self, origin: Vec3A, turn: &Mat3A, directions: &[Vec3A], counts: &[bool]) -> Vec<Option<BlockerHit>> {
+        Arch::new().dispatch(Cast { blockers: self, origin, turn, directions, asked: Asked::Counted(counts) })
     }
 
-    /// Adds the first triangle on each ray of a few members.
+    /// The first triangle on each ray of a few members.
     pub fn first_of(
         &self,
         origin: Vec3A,
         turn: &Mat3A,
         directions: &[Vec3A],
         members: &[u32],
-        hits: &mut Vec<Option<BlockerHit>>,
-    ) {
-        Arch::new().dispatch(Cast { blockers: self, origin, turn, directions, asked: Asked::Members(members), hits });
+    ) -> Vec<Option<BlockerHit>> {
+        Arch::new().dispatch(Cast { blockers: self, origin, turn, directions, asked: Asked::Members(members) })
     }
 
     /// Meets the triangles below a node; `counts` tells of each member whether it counts, `None` that all do.
@@ -562,17 +555,14 @@ mod tests {
         };
         let blockers = Blockers::new((0..).zip(&corners).map(triangle), Vec::new(), Vec::new());
         let mut rng = fastrand::Rng::with_seed(3);
-        let mut hits = Vec::new();
         let mut met = 0;
         for _ in 0..50 {
             let origin = 1.5 * random_direction(&mut rng).as_vec3a();
             let directions: Vec<Vec3A> = (0..37).map(|_| random_direction(&mut rng).as_vec3a()).collect();
             for only_second in [false, true] {
-                hits.clear();
-                blockers.first(origin, &Mat3A::IDENTITY, &directions, &[!only_second, true], &mut hits);
+                let hits = blockers.first(origin, &Mat3A::IDENTITY, &directions, &[!only_second, true]);
                 let of = if only_second { &[1][..] } else { &[1, 0] };
-                let mut of_members = Vec::new();
-                blockers.first_of(origin, &Mat3A::IDENTITY, &directions, of, &mut of_members);
+                let of_members = blockers.first_of(origin, &Mat3A::IDENTITY, &directions, of);
                 let distances = |hits: &[Option<BlockerHit>]| -> Vec<Option<f32>> {
                     hits.iter().map(|hit| hit.map(|hit| hit.distance)).collect()
                 };
@@ -598,9 +588,8 @@ mod tests {
             }
         }
         assert!((300..3300).contains(&met), "{met}");
-        hits.clear();
-        Blockers::new([], Vec::new(), Vec::new()).first(Vec3A::ZERO, &Mat3A::IDENTITY, &[Vec3A::X], &[], &mut hits);
-        assert_eq!(hits, [None]);
+        let nothing = Blockers::new([], Vec::new(), Vec::new());
+        assert_eq!(nothing.first(Vec3A::ZERO, &Mat3A::IDENTITY, &[Vec3A::X], &[]), [None]);
     }
 
     /// A ray passes the holes of squares that stand one behind the other, up to the first place that is none.
@@ -621,10 +610,8 @@ mod tests {
             vec![mask.clone(), mask, None],
             Vec::new(),
         );
-        let mut hits = Vec::new();
         for (x, distance) in [(0.3, 1.0), (0.7, 3.0)] {
-            hits.clear();
-            blockers.first(Vec3A::new(x, 0.5, 0.0), &Mat3A::IDENTITY, &[Vec3A::Z], &[true; 3], &mut hits);
+            let hits = blockers.first(Vec3A::new(x, 0.5, 0.0), &Mat3A::IDENTITY, &[Vec3A::Z], &[true; 3]);
             assert!((hits[0].unwrap().distance - distance).abs() < 1e-5, "{x}: {hits:?}");
         }
     }

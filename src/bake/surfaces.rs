@@ -779,15 +779,13 @@ impl GroupSpace<'_> {
     /// each of which it sees all. Outlines of what surrounds a point, as those of a house, tell this badly near its walls.
     fn seen_suns(&self, point: Vec3, normal: Vec3) -> [u32; 2] {
         let origin = self.placed(point);
-        let mut hits = Vec::with_capacity(SUN_RAYS.len());
-        let mut sees = |sun: &CrispSun| {
+        let sees = |sun: &CrispSun| {
             if normal.dot(self.local(sun.toward)) <= 0.0 {
                 return [true, false];
             }
             let (x, y) = sun.toward.any_orthonormal_pair();
             let ray = |[a, b]: [f64; 2]| (sun.toward + sun.half_angle_rad * (a * x + b * y)).normalize().as_vec3a();
-            hits.clear();
-            self.group.blockers.first(origin, &Mat3A::IDENTITY, &SUN_RAYS.map(ray), &self.blocks, &mut hits);
+            let hits = self.group.blockers.first(origin, &Mat3A::IDENTITY, &SUN_RAYS.map(ray), &self.blocks);
             [hits.iter().all(Option::is_some), hits.iter().all(Option::is_none)]
         };
         let mut bits = [0; 2];
@@ -826,9 +824,8 @@ impl GroupSpace<'_> {
 
     /// Whether the way from a point of the member's frame towards a sun is free.
     pub fn sees(&self, point: Vec3, sun: DVec3) -> bool {
-        let mut hits = Vec::with_capacity(1);
-        self.group.blockers.first(self.placed(point), &Mat3A::IDENTITY, &[sun.as_vec3a()], &self.blocks, &mut hits);
-        hits[0].is_none()
+        let origin = self.placed(point);
+        self.group.blockers.first(origin, &Mat3A::IDENTITY, &[sun.as_vec3a()], &self.blocks)[0].is_none()
     }
 
     /// A direction of the world in the member's frame.
@@ -839,9 +836,8 @@ impl GroupSpace<'_> {
     /// The first of those members that count.
     fn first_between(&self, counts: &[bool], from: Vec3, to: Vec3) -> Option<BlockerHit> {
         let [from, to] = [from, to].map(|point| self.placed(point));
-        let mut hits = Vec::with_capacity(1);
         let toward = (to - from).normalize_or_zero();
-        self.group.blockers.first(from, &Mat3A::IDENTITY, &[toward], counts, &mut hits);
+        let hits = self.group.blockers.first(from, &Mat3A::IDENTITY, &[toward], counts);
         hits[0].filter(|hit| hit.distance < from.distance(to))
     }
 
@@ -873,9 +869,9 @@ impl GroupSpace<'_> {
             if !self.others[member] || self.keeps_outline(member) || origins.iter().any(is_beside) {
                 return false;
             }
-            let mut hits = Vec::with_capacity(origins.len() * toward.len());
             let of = [member as u32];
-            origins.iter().for_each(|o| group.blockers.first_of(*o, &Mat3A::IDENTITY, &toward, &of, &mut hits));
+            let cast = |origin: &Vec3A| group.blockers.first_of(*origin, &Mat3A::IDENTITY, &toward, &of);
+            let hits: Vec<Option<BlockerHit>> = origins.iter().flat_map(cast).collect();
             hits.iter().flatten().count() as f64 > AROUND * hits.len() as f64
         };
         (0..self.blocks.len()).into_par_iter().map(is_around).collect()

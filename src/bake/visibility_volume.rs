@@ -71,9 +71,8 @@ impl GroupPlan {
         let stride = channel_stride(plan.bands);
         let coefficients = coefficient_count(plan.bands);
         let look = |number: u32| {
-            let mut hits = Vec::with_capacity(rays.len());
             let origin = group.place(plan.nodes.node(number));
-            group.blockers.first(origin, &Mat3A::IDENTITY, &toward, &blocks, &mut hits);
+            let hits = group.blockers.first(origin, &Mat3A::IDENTITY, &toward, &blocks);
             let mut blocked = vec![0.0; stride];
             let mut met = vec![0; blocks.len()];
             let mut behind = 0;

@@ -101,7 +101,7 @@ impl BakeReport {
     }
 }
 
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Wanted {
     pub transfer: bool,
     pub self_visibility: bool,

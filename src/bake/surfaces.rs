@@ -123,7 +123,7 @@ pub struct Member {
     pub refines: bool,
 }
 
-#[derive(Clone)]
+#[derive(Clone, Default)]
 pub struct GroupPlan {
     /// The members' entities, of one group of several; every entity with this mesh of a group of one.
     pub entities: Vec<usize>,
@@ -259,7 +259,6 @@ impl SurfacePlan {
             } else {
                 entities.iter().map(|&entity| member(entity, scene.data.entities[entity].fixed())).collect()
             };
-            let bands = options.bands;
             let is_resting_group = members.len() > 1 && scene.is_at_rest(entities[0]);
             let screens = if is_resting_group { screens.clone() } else { Vec::new() };
             // Vertices of meshes that are left as they are may lie in the very seam of two walls.
@@ -268,14 +267,11 @@ impl SurfacePlan {
                 entities,
                 members,
                 wanted,
-                views_sky: false,
-                bands,
+                bands: options.bands,
                 refinement,
                 suns,
                 screens,
-                key: None,
-                name: String::new(),
-                volume: None,
+                ..GroupPlan::default()
             });
         }
         let named = |plan: GroupPlan| {
@@ -319,21 +315,7 @@ impl GroupPlan {
             receives: true,
             refines: false,
         }];
-        let bands = options.bands;
-        let plan = GroupPlan {
-            entities: Vec::new(),
-            members,
-            wanted,
-            views_sky: false,
-            bands,
-            refinement: None,
-            suns: Vec::new(),
-            screens: Vec::new(),
-            key: None,
-            name: String::new(),
-            volume: None,
-        };
-        plan.named()
+        GroupPlan { members, wanted, bands: options.bands, ..GroupPlan::default() }.named()
     }
 
     fn named(mut self) -> Self {

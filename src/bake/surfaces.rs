@@ -483,13 +483,11 @@ impl GroupPlan {
     fn limits(&self, group: &Group<'_>, start: usize) -> Option<Limits> {
         let (vertices, moves) = self.refinement?;
         let extent = group.extent;
-        let flat_area: f64 = group
-            .standings
-            .iter()
-            .zip(&self.members)
-            .filter(|(_, member)| member.mesh.is_flat() && member.receives)
-            .map(|(s, member)| member.mesh.area_m2() * (s.radius / f64::from(member.mesh.bounding_sphere().1)).powi(2))
-            .sum();
+        let area = |((_, radius), Member { mesh, .. }): (&(DVec3, f64), &Member)| {
+            mesh.area_m2() * (radius / f64::from(mesh.bounding_sphere().1)).powi(2)
+        };
+        let flat = group.spheres.iter().zip(&self.members).filter(|(_, of)| of.mesh.is_flat() && of.receives);
+        let flat_area: f64 = flat.map(area).sum();
         let flat_edge = (0.02 * extent).max((4.0 * flat_area / f64::from(vertices)).sqrt() as f32);
         Some(Limits {
             vertices: (vertices as usize).max(start + vertices as usize / LEAST_ADDED),
@@ -507,7 +505,6 @@ pub(super) struct Group<'p> {
     pub blockers: Blockers,
     centre: DVec3,
     radius_m: f64,
-    standings: Vec<Standing>,
     spheres: Vec<(DVec3, f64)>,
     /// Of each member in its own frame, metres.
     boxes: Vec<[DVec3; 2]>,
@@ -526,15 +523,6 @@ impl<'p> Group<'p> {
         let (centre, radius_m) = around_spheres(&world).unwrap_or((DVec3::ZERO, 1.0));
         let spheres: Vec<(DVec3, f64)> =
             world.iter().map(|(c, radius)| ((*c - centre) / radius_m, radius / radius_m)).collect();
-        let standings = plan
-            .members
-            .iter()
-            .zip(&spheres)
-            .map(|(member, (_, radius))| Standing {
-                rotation: DMat3::from_quat(member.placement.turn()),
-                radius: *radius,
-            })
-            .collect();
         let to_group =
             |member: &Member, p: Vec3| ((member.placement.point(p.as_dvec3()) - centre) / radius_m).as_vec3();
         let triangles = (0..).zip(&plan.members).flat_map(|(index, member)| {
@@ -561,7 +549,7 @@ impl<'p> Group<'p> {
         let solid: Vec<(DVec3, f64)> =
             spheres.iter().zip(&plan.members).filter(|(_, m)| !m.mesh.is_flat()).map(|(s, _)| *s).collect();
         let extent = around_spheres(&solid).map_or(2.0, |(_, radius)| 2.0 * radius) as f32;
-        Group { plan, blockers, centre, radius_m, standings, spheres, boxes, extent, targets, screens }
+        Group { plan, blockers, centre, radius_m, spheres, boxes, extent, targets, screens }
     }
 
     /// A place of the world in the group's frame.
@@ -682,7 +670,8 @@ impl GroupSpace<'_> {
         let group = self.group;
         let near = NEAR * edge * self.scale();
         let eye = Eye { origin: self.placed(position + nudge).into(), normal, near };
-        let standing = &group.standings[self.member];
+        let rotation = DMat3::from_quat(self.own().placement.turn());
+        let standing = Standing { rotation, radius: group.spheres[self.member].1 };
         let counts = Counts {
             blocks: &self.blocks,
             in_map,
@@ -690,7 +679,7 @@ impl GroupSpace<'_> {
             targets: &group.targets,
             screens: &group.screens,
         };
-        let mut seen = see(&group.blockers, standing, &eye, group.plan.bands, rays, counts);
+        let mut seen = see(&group.blockers, &standing, &eye, group.plan.bands, rays, counts);
         seen.from = position + nudge;
         let is_covered = self.is_covered(position, normal, nudge);
         if is_covered {

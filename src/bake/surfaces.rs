@@ -927,15 +927,11 @@ impl GroupSpace<'_> {
                         let corners = mesh.triangles[triangle as usize].iter();
                         corners.map(|&v| mesh.positions[v as usize]).sum::<Vec3>() / 3.0
                     };
-                    let middles = || {
-                        around.get_or_init(|| triangles_around(mesh.positions.len(), &mesh.triangles))[v]
-                            .iter()
-                            .map(|&triangle| middle(triangle))
-                    };
+                    let all_around = || triangles_around(mesh.positions.len(), &mesh.triangles);
+                    let triangles = &around.get_or_init(all_around)[v];
+                    let middles = || triangles.iter().map(|&triangle| middle(triangle));
                     let neighbours = || {
-                        let triangles =
-                            around.get_or_init(|| triangles_around(mesh.positions.len(), &mesh.triangles))[v].iter();
-                        let corners = triangles.flat_map(|&triangle| mesh.triangles[triangle as usize]);
+                        let corners = triangles.iter().flat_map(|&triangle| mesh.triangles[triangle as usize]);
                         corners.filter(|corner| *corner as usize != v).map(|corner| mesh.positions[corner as usize])
                     };
                     let few = |place: Vec3| self.see(at(place), Rays::Few);

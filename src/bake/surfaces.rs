@@ -1198,9 +1198,38 @@ pub(super) struct StoredGroup {
     surfaces: Vec<StoredSurface>,
 }
 
-/// The next `count` vectors of a payload.
-fn vectors<'p, T: bytemuck::Pod>(take: &mut impl FnMut(usize) -> Option<&'p [u8]>, count: usize) -> Option<Vec<T>> {
-    Some(bytemuck::pod_collect_to_vec(take(count.checked_mul(size_of::<T>())?)?))
+/// What is left of a payload.
+struct Rest<'p>(&'p [u8]);
+
+impl Rest<'_> {
+    fn take<T: bytemuck::Pod>(&mut self, count: usize) -> Option<Vec<T>> {
+        let (taken, after) = self.0.split_at_checked(count.checked_mul(size_of::<T>())?)?;
+        self.0 = after;
+        Some(bytemuck::pod_collect_to_vec(taken))
+    }
+
+    /// What is there or not; `None` where it is missing.
+    fn take_if<T: bytemuck::Pod>(&mut self, is_there: bool, count: usize) -> Option<Option<Vec<T>>> {
+        if is_there { self.take(count).map(Some) } else { Some(None) }
+    }
+
+    /// How many things each vertex has, and all of these, where there are so many.
+    fn take_counted<T: bytemuck::Pod>(
+        &mut self,
+        vertices: usize,
+        all: Option<usize>,
+    ) -> Option<Option<(Vec<u8>, Vec<T>)>> {
+        let Some(all) = all else { return Some(None) };
+        let counts: Vec<u8> = self.take(vertices)?;
+        let things = self.take(all)?;
+        let sum: usize = counts.iter().map(|count| usize::from(*count)).sum();
+        (sum == all).then_some(Some((counts, things)))
+    }
+}
+
+/// The bytes of what may be there.
+fn bytes<T: bytemuck::Pod>(of: Option<&Vec<T>>) -> &[u8] {
+    of.map(|of| bytemuck::cast_slice(of)).unwrap_or_default()
 }
 
 impl GroupPlan {
@@ -1213,24 +1242,18 @@ impl GroupPlan {
             if refined {
                 payload.extend_from_slice(bytemuck::cast_slice(&mesh.positions));
                 payload.extend_from_slice(bytemuck::cast_slice(&mesh.normals));
-                payload.extend_from_slice(bytemuck::cast_slice(mesh.colors.as_deref().unwrap_or_default()));
-                payload.extend_from_slice(bytemuck::cast_slice(mesh.uvs.as_deref().unwrap_or_default()));
-                payload.extend_from_slice(bytemuck::cast_slice(mesh.tints.as_deref().unwrap_or_default()));
+                payload.extend_from_slice(bytes(mesh.colors.as_ref()));
+                payload.extend_from_slice(bytes(mesh.uvs.as_ref()));
+                payload.extend_from_slice(bytes(mesh.tints.as_ref()));
                 payload.extend_from_slice(bytemuck::cast_slice(&mesh.triangles));
             }
-            if let Some(floats) = transfer {
-                payload.extend_from_slice(bytemuck::cast_slice(floats));
-            }
+            payload.extend_from_slice(bytes(transfer.as_deref()));
             if let Some(views) = sky {
                 payload.extend_from_slice(&views.counts);
                 payload.extend_from_slice(views.cells.as_flattened());
             }
-            if let Some(maps) = self_visibility {
-                payload.extend_from_slice(maps);
-            }
-            if let Some(told) = told_suns {
-                payload.extend_from_slice(bytemuck::cast_slice(told));
-            }
+            payload.extend_from_slice(bytes(self_visibility.as_deref()));
+            payload.extend_from_slice(bytes(told_suns.as_deref()));
             if let Some(links) = links {
                 payload.extend_from_slice(&links.counts);
                 payload.extend_from_slice(bytemuck::cast_slice(&links.packed));
@@ -1260,80 +1283,46 @@ impl GroupPlan {
         if self.key.as_ref() != Some(&header.key) || header.surfaces.len() != self.members.len() {
             return None;
         }
-        let mut rest = payload;
-        let mut take = |bytes: usize| -> Option<&[u8]> {
-            let (taken, after) = rest.split_at_checked(bytes)?;
-            rest = after;
-            Some(taken)
-        };
+        let mut rest = Rest(payload);
         let mut surfaces = Vec::new();
         for (member, stored) in self.members.iter().zip(&header.surfaces) {
             let mut mesh = member.mesh.clone();
+            let vertices = stored.vertices;
             if stored.refined {
-                let positions: Vec<Vec3> = vectors(&mut take, stored.vertices)?;
-                let normals: Vec<Vec3> = vectors(&mut take, stored.vertices)?;
-                let own = &member.mesh;
-                let mut attributes = Attributes::default();
-                if own.colors.is_some() {
-                    attributes.colors = Some(vectors(&mut take, stored.vertices)?);
-                }
-                if own.uvs.is_some() {
-                    attributes.uvs = Some(vectors(&mut take, stored.vertices)?);
-                }
-                if own.tints.is_some() {
-                    attributes.tints = Some(vectors(&mut take, stored.vertices)?);
-                }
-                let triangles: Vec<[u32; 3]> = bytemuck::pod_collect_to_vec(take(stored.triangles.checked_mul(12)?)?);
-                let fits = triangles.iter().flatten().all(|&v| (v as usize) < positions.len());
+                let positions: Vec<Vec3> = rest.take(vertices)?;
+                let normals: Vec<Vec3> = rest.take(vertices)?;
+                let attributes = Attributes {
+                    colors: rest.take_if(mesh.colors.is_some(), vertices)?,
+                    uvs: rest.take_if(mesh.uvs.is_some(), vertices)?,
+                    tints: rest.take_if(mesh.tints.is_some(), vertices)?,
+                };
+                let triangles: Vec<[u32; 3]> = rest.take(stored.triangles)?;
+                let fits = triangles.iter().flatten().all(|&v| (v as usize) < vertices);
                 let is_finite = positions.iter().chain(&normals).all(|v| v.is_finite());
                 if !fits || !is_finite {
                     return None;
                 }
                 mesh = Arc::new(mesh.refined(positions, normals, attributes, triangles));
-            } else if stored.vertices != mesh.positions.len() {
+            } else if vertices != mesh.positions.len() {
                 return None;
             }
-            let floats = stored.vertices.checked_mul(4 * channel_stride(self.bands))?;
-            let transfer = match stored.transfer {
-                true => Some(Arc::new(bytemuck::pod_collect_to_vec(take(floats)?))),
-                false => None,
-            };
-            let sky = match stored.sky {
-                Some(shares) => {
-                    let counts = take(stored.vertices)?.to_vec();
-                    let cells: Vec<[u8; 2]> = vectors(&mut take, shares)?;
-                    (counts.iter().map(|count| usize::from(*count)).sum::<usize>() == shares).then_some(())?;
-                    Some(Arc::new(SkyViews { of_world: self.members.len() > 1, counts, cells }))
-                }
-                None => None,
-            };
-            let self_visibility = match stored.self_visibility {
-                true => Some(Arc::new(take(stored.vertices.checked_mul(BYTES)?)?.to_vec())),
-                false => None,
-            };
-            let told_suns = match stored.told_suns {
-                true => Some(Arc::new(vectors(&mut take, stored.vertices)?)),
-                false => None,
-            };
-            let links = match stored.links {
-                0 => None,
-                links => {
-                    let counts = take(stored.vertices)?.to_vec();
-                    let packed: Vec<u32> = vectors(&mut take, links)?;
-                    let directions = if self.screens.is_empty() { 0 } else { links };
-                    let directions: Vec<u32> = vectors(&mut take, directions)?;
-                    (counts.iter().map(|count| usize::from(*count)).sum::<usize>() == links).then_some(())?;
-                    Some(Arc::new(Links { counts, packed, directions }))
-                }
-            };
+            let transfer = rest.take_if(stored.transfer, vertices * channel_stride(self.bands))?.map(Arc::new);
+            let sky = rest.take_counted(vertices, stored.sky)?;
+            let of_world = self.members.len() > 1;
+            let sky = sky.map(|(counts, cells)| Arc::new(SkyViews { of_world, counts, cells }));
+            let self_visibility = rest.take_if(stored.self_visibility, vertices * BYTES)?.map(Arc::new);
+            let told_suns = rest.take_if(stored.told_suns, vertices)?.map(Arc::new);
+            let links = rest.take_counted(vertices, (stored.links > 0).then_some(stored.links))?;
+            let directions = rest.take(if self.screens.is_empty() { 0 } else { stored.links })?;
+            let links = links.map(|(counts, packed)| Arc::new(Links { counts, packed, directions }));
             let mut near = Vec::new();
             for _ in 0..stored.clusters {
-                let count: u32 = bytemuck::pod_read_unaligned(take(4)?);
-                near.push(bytemuck::pod_collect_to_vec(take(4 * count as usize)?));
+                let count = rest.take::<u32>(1)?[0];
+                near.push(rest.take(count as usize)?);
             }
             surfaces.push(BakedSurface { mesh, transfer, sky, self_visibility, near, links, told_suns });
         }
-        rest.is_empty().then_some(surfaces)
+        rest.0.is_empty().then_some(surfaces)
     }
 
     /// Entities of a cluster's near members.

@@ -171,20 +171,6 @@ pub(super) struct Movers {
     spheres: Upload,
 }
 
-fn pipelines(
-    device: &Arc<Device>,
-    library: &Library,
-    permutation: &MergePermutation,
-    self_shadows: bool,
-) -> Result<[ComputePipeline; 3]> {
-    let pipeline = |name: &str, row: ShaderPermutation| ComputePipeline::new(device, name, &library.shader(&row)?);
-    Ok([
-        pipeline("outgoing", outgoing_row(permutation))?,
-        pipeline("distant movers", distant_row(permutation))?,
-        pipeline("movers", movers_row(permutation, self_shadows))?,
-    ])
-}
-
 impl Movers {
     pub fn new(
         device: &Arc<Device>,
@@ -195,7 +181,7 @@ impl Movers {
         vertex_count: u32,
         lists: [&LinkList; 2],
     ) -> Result<Self> {
-        let [outgoing, distant, movers] = pipelines(device, library, &permutation, self_shadows)?;
+        let pipeline = |name: &str, row: ShaderPermutation| ComputePipeline::new(device, name, &library.shader(&row)?);
         // No buffer is empty.
         let buffer = |name: &str, quads: &[[f32; 4]]| match quads {
             [] => Buffer::zeros(device, name, 16),
@@ -204,9 +190,9 @@ impl Movers {
         let of_entity = |cuboid: &Option<Cuboid>| cuboid.map_or([[0.0; 4]; 3], |cuboid| cuboid.quads());
         let edges: Vec<[f32; 4]> = surfaces.cuboids.iter().flat_map(of_entity).collect();
         Ok(Movers {
-            outgoing,
-            distant,
-            movers,
+            outgoing: pipeline("outgoing", outgoing_row(&permutation))?,
+            distant: pipeline("distant movers", distant_row(&permutation))?,
+            movers: pipeline("movers", movers_row(&permutation, self_shadows))?,
             movers_data: Upload::new(device, "movers", size_of_val(&surfaces.movers[..]).max(32) as u64)?,
             runs: buffer("runs of movers", bytemuck::cast_slice(&surfaces.runs))?,
             light: Buffer::zeros(device, "light of movers", (16 * OUTGOING * surfaces.rests.len()) as u64)?,

@@ -345,15 +345,12 @@ impl Movers {
                     let cone = Cone::new(object.centre, object.radius_m, vertex.position);
                     let to_object = object.rotation.inverse();
                     let from = to_object * (vertex.position - object.centre) / object.radius_m;
-                    let field = object.blocked.expect("what reflects has an occlusion field");
-                    let mut blocked = [0.0; MAX_COEFFICIENTS];
-                    field.lookup(from, 0, &mut blocked);
-                    let cosine = clamped_cosine(field.header.bands.min(self.permutation().bands), to_object * normal);
+                    let (blocked, direction) = blocked_from(object, from);
+                    let cosine = clamped_cosine(self.permutation().bands, to_object * normal);
                     let share: f64 = blocked.iter().zip(&cosine).map(|(b, c)| b * c).sum();
                     let own = own_visible(&vertex, receiver, &cone, object.radius_m);
                     let share = share * cone.above_horizon(normal, input.skip) * object.opacity / PI * own;
                     let share = f64::from(weight) * share.max(0.0);
-                    let direction = seen_from(from, field.header.bands, &blocked);
                     sum += share * self.seen(entity, &outgoing[entity], from, direction);
                     taken += share;
                     hidden += if place < near_boxes { share } else { 0.0 };
@@ -382,10 +379,7 @@ impl Movers {
         let object = &objects[entity];
         let to = object.centre - middle;
         let from = object.rotation.inverse() * -to / object.radius_m;
-        let field = object.blocked.expect("what reflects has an occlusion field");
-        let mut blocked = [0.0; MAX_COEFFICIENTS];
-        field.lookup(from, 0, &mut blocked);
-        let direction = seen_from(from, field.header.bands, &blocked);
+        let (blocked, direction) = blocked_from(object, from);
         let cosine = (1.0 - blocked[0] / (2.0 * PI * Y00)).clamp(0.0, 1.0);
         Sphere {
             centre: middle - to.length() * (object.rotation * direction),
@@ -490,10 +484,12 @@ fn own_visible(vertex: &TwinVertex<'_>, receiver: &MergeObject<'_>, cone: &Cone,
     (seen / open.max(0.05)).clamp(0.0, 1.0)
 }
 
-/// Against the middle of the directions that a mover blocks, in its frame, `from` where the viewer stands.
-fn seen_from(from: DVec3, bands: usize, blocked: &[f64; MAX_COEFFICIENTS]) -> DVec3 {
-    let middle = if bands == 1 { from } else { DVec3::new(blocked[3], blocked[1], -blocked[2]) };
-    middle.normalize_or_zero()
+/// What a mover blocks as seen from a place in its frame, in r, and against the middle of those directions.
+fn blocked_from(object: &MergeObject<'_>, from: DVec3) -> ([f64; MAX_COEFFICIENTS], DVec3) {
+    let field = object.blocked.expect("what reflects has an occlusion field");
+    let mut blocked = [0.0; MAX_COEFFICIENTS];
+    field.lookup(from, 0, &mut blocked);
+    (blocked, DVec3::new(blocked[3], blocked[1], -blocked[2]).normalize_or_zero())
 }
 
 /// Mean radiosity of the faces of a box that are seen from a place in its frame, in r.

@@ -14,7 +14,7 @@
 //! In band 3 the integral of p p over the arc is sin a u u + (a - sin a) / 2 (1 - n n), and the unit matrix drops out of
 //! a harmonic polynomial. Band 0 is the solid angle (reference 6 of [`crate::sh`]).
 
-use super::basis::{Y00, evaluate};
+use super::basis::{Y00, values};
 use glam::DVec3;
 use std::f64::consts::SQRT_2;
 
@@ -41,14 +41,9 @@ pub fn polygon(corners: &[DVec3]) -> [f64; POLYGON_COEFFICIENTS] {
 }
 
 fn add_edge(blocked: &mut [f64; POLYGON_COEFFICIENTS], normal: DVec3, middle: DVec3, angle: f64) {
-    let values = |direction: DVec3| {
-        let mut y = [0.0; POLYGON_COEFFICIENTS];
-        evaluate(POLYGON_BANDS, direction, &mut y);
-        y
-    };
-    let of_normal = values(normal);
-    let above = values((middle + normal) / SQRT_2);
-    let below = values((middle - normal) / SQRT_2);
+    let of_normal = values(POLYGON_BANDS, normal);
+    let above = values(POLYGON_BANDS, (middle + normal) / SQRT_2);
+    let below = values(POLYGON_BANDS, (middle - normal) / SQRT_2);
     let sine = angle.sin();
     for (k, blocked) in blocked.iter_mut().enumerate().skip(1) {
         let change = above[k] - below[k];

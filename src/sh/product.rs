@@ -44,13 +44,8 @@ impl Tensor {
     pub fn new(bands: usize) -> Self {
         assert!((1..=MAX_BANDS).contains(&bands), "bands must be 1 to {MAX_BANDS}, not {bands}");
         let count = coefficient_count(bands);
-        let points: Vec<([f64; MAX_COEFFICIENTS], f64)> = sphere_rule(3 * (bands - 1))
-            .into_iter()
-            .map(|(direction, weight)| {
-                let basis = values(bands, direction);
-                (basis, weight)
-            })
-            .collect();
+        let rule = sphere_rule(3 * (bands - 1)).into_iter();
+        let points: Vec<_> = rule.map(|(direction, weight)| (values(bands, direction), weight)).collect();
         let mut entries = Vec::new();
         let mut sums = vec![0.0; count];
         for i in 0..count {

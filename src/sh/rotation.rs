@@ -25,10 +25,7 @@ impl WeightedBasis {
         } else {
             sphere_rule(degree)
         };
-        let points = rule.into_iter().map(|(point, weight)| {
-            let basis = values(bands, point);
-            (point, basis.map(|y| weight * y))
-        });
+        let points = rule.into_iter().map(|(point, weight)| (point, values(bands, point).map(|y| weight * y)));
         Self { points: points.collect() }
     }
 

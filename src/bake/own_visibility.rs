@@ -666,30 +666,26 @@ mod tests {
     use crate::asset::generate;
     use crate::bake::packet::BlockerTriangle;
     use crate::field::self_visibility::decode_angle;
+    use crate::sh::quadrature::even_directions;
 
-    fn triangle((member, corners): (u32, [Vec3; 3])) -> BlockerTriangle {
-        BlockerTriangle { member, number: 0, corners }
+    fn blockers(triangles: impl Iterator<Item = (u32, [Vec3; 3])>) -> Blockers {
+        let triangle = |(member, corners)| BlockerTriangle { member, number: 0, corners };
+        Blockers::new(triangles.map(triangle), Vec::new(), Vec::new())
+    }
+
+    /// What a place sees that looks up; `in_map` are members that its map has.
+    fn see_up(blockers: &Blockers, origin: Vec3, in_map: Option<&[u32]>) -> Seen {
+        let eye = Eye { origin, normal: Vec3::Y, near: 0.0 };
+        let counts = Counts { blocks: &[true; 8], in_map, sky: false, targets: &[], screens: &[] };
+        let standing = Standing { rotation: DMat3::IDENTITY, radius: 1.0 };
+        see(blockers, &standing, &eye, 4, Rays::Many, counts)
     }
 
     /// A receiver at the origin that looks up at a ball of radius 1 whose centre lies `toward`.
     fn under_a_ball(toward: DVec3, with_map: bool) -> Seen {
         let ball = generate::sphere(1.0, 5);
         let corners = ball.triangles.iter().map(|t| (7, t.map(|i| ball.positions[i as usize] + toward.as_vec3())));
-        let eye = Eye { origin: Vec3::ZERO, normal: Vec3::Y, near: 0.0 };
-        let counts =
-            Counts { blocks: &[true; 8], in_map: with_map.then_some(&[7]), sky: false, targets: &[], screens: &[] };
-        let standing = Standing { rotation: DMat3::IDENTITY, radius: 1.0 };
-        see(&Blockers::new(corners.map(triangle), Vec::new(), Vec::new()), &standing, &eye, 4, Rays::Many, counts)
-    }
-
-    /// Directions all over the sphere, of equal areas: a Fibonacci lattice.
-    fn lattice(count: usize) -> impl Iterator<Item = DVec3> {
-        (0..count).map(move |i| {
-            let height = 1.0 - (2.0 * i as f64 + 1.0) / count as f64;
-            let across = (1.0 - height * height).sqrt();
-            let turn = 2.399963229728653 * i as f64;
-            DVec3::new(across * turn.cos(), across * turn.sin(), height)
-        })
+        see_up(&blockers(corners), Vec3::ZERO, with_map.then_some(&[7]))
     }
 
     /// Against the cosine over all that the ball leaves free.
@@ -705,7 +701,7 @@ mod tests {
             let seen = under_a_ball(toward, false);
             let mut wanted = [0.0; MAX_COEFFICIENTS];
             const COUNT: usize = 400_000;
-            for direction in lattice(COUNT) {
+            for direction in even_directions(COUNT) {
                 let off = toward.length_squared() - direction.dot(toward).powi(2);
                 let blocked = direction.dot(toward) > 0.0 && off < 1.0;
                 if !blocked && direction.y > 0.0 {
@@ -729,24 +725,17 @@ mod tests {
             let [a, b, c, d] = corners.map(|[across, y]| Vec3::new(x + across, y, 1.0));
             [(0, [a, b, c]), (0, [a, c, d])]
         };
-        let blockers =
-            Blockers::new((-20..20).flat_map(|i| bar(0.15 * i as f32)).map(triangle), Vec::new(), Vec::new());
-        let standing = Standing { rotation: DMat3::IDENTITY, radius: 1.0 };
+        let blockers = blockers((-20..20).flat_map(|i| bar(0.15 * i as f32)));
         let [mut mean, mut square] = [0.0; 2];
         const PLACES: usize = 400;
         for place in 0..PLACES {
-            let eye = Eye {
-                origin: Vec3::new(0.00371 * place as f32, 0.0, 0.001 * place as f32),
-                normal: Vec3::Y,
-                near: 0.0,
-            };
-            let directions: Vec<Vec3A> = lattice(40_000).filter(|d| d.y > 0.0).map(|d| d.as_vec3a()).collect();
-            let hits = blockers.first(eye.origin.into(), &Mat3A::IDENTITY, &directions, &[true]);
+            let origin = Vec3::new(0.00371 * place as f32, 0.0, 0.001 * place as f32);
+            let directions: Vec<Vec3A> = even_directions(40_000).filter(|d| d.y > 0.0).map(|d| d.as_vec3a()).collect();
+            let hits = blockers.first(origin.into(), &Mat3A::IDENTITY, &directions, &[true]);
             let wanted: f64 =
                 directions.iter().zip(&hits).filter(|(_, hit)| hit.is_some()).map(|(d, _)| f64::from(d.y)).sum();
             let wanted = wanted / directions.iter().map(|d| f64::from(d.y)).sum::<f64>();
-            let counts = Counts { blocks: &[true], in_map: None, sky: false, targets: &[], screens: &[] };
-            let found = see(&blockers, &standing, &eye, 4, Rays::Many, counts).blocked;
+            let found = see_up(&blockers, origin, None).blocked;
             mean += (found / wanted - 1.0) / PLACES as f64;
             square += (found / wanted - 1.0).powi(2) / PLACES as f64;
         }
@@ -783,18 +772,8 @@ mod tests {
         };
         let near = square(1.0).map(|t| (0, t));
         let far = square(0.5).map(|t| (1, t));
-        let eye = Eye { origin: Vec3::ZERO, normal: Vec3::Y, near: 0.0 };
-        let standing = Standing { rotation: DMat3::IDENTITY, radius: 1.0 };
         let see_with = |in_map: &[u32], corners: &[(u32, [Vec3; 3])]| {
-            let counts = Counts { blocks: &[true; 2], in_map: Some(in_map), sky: false, targets: &[], screens: &[] };
-            see(
-                &Blockers::new(corners.iter().copied().map(triangle), Vec::new(), Vec::new()),
-                &standing,
-                &eye,
-                4,
-                Rays::Many,
-                counts,
-            )
+            see_up(&blockers(corners.iter().copied()), Vec3::ZERO, Some(in_map))
         };
         // The member that the map leaves out stands in front of the one that it has.
         let both = see_with(&[0], &[&near[..], &far[..]].concat());

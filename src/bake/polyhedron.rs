@@ -107,6 +107,7 @@ mod tests {
     use super::*;
     use crate::asset::generate;
     use crate::sh::basis::{Y00, values};
+    use crate::sh::quadrature::random_direction;
 
     #[test]
     fn a_box_blocks_what_rays_meet() {
@@ -121,10 +122,7 @@ mod tests {
             let mut wanted = [0.0; POLYGON_COEFFICIENTS];
             const RAYS: usize = 200_000;
             for _ in 0..RAYS {
-                let z = 2.0 * rng.f64() - 1.0;
-                let turn = std::f64::consts::TAU * rng.f64();
-                let flat = (1.0 - z * z).sqrt();
-                let way = DVec3::new(flat * turn.cos(), flat * turn.sin(), z);
+                let way = random_direction(&mut rng);
                 let [one, other] = [(-half - eye) / way, (half - eye) / way];
                 let hit = one.min(other).max_element() < one.max(other).min_element().max(0.0);
                 if hit && one.max(other).min_element() > 0.0 {

@@ -145,6 +145,7 @@ impl SkyFit {
 mod tests {
     use super::*;
     use crate::sh::basis::values;
+    use crate::sh::quadrature::even_directions;
 
     #[test]
     fn directions_of_a_cell_lie_in_it() {
@@ -163,16 +164,9 @@ mod tests {
     fn light_through_a_window_is_that_of_the_exact_sky() {
         let sky = |d: DVec3| if d.y > 0.0 { DVec3::new(1.0, 1.5, 2.0) - d.y } else { DVec3::splat(0.1) };
         const COUNT: usize = 200_000;
-        let lattice = || {
-            (0..COUNT).map(|i| {
-                let y = 1.0 - (2.0 * i as f64 + 1.0) / COUNT as f64;
-                let turn = 2.399_963_229_728_653 * i as f64;
-                (1.0 - y * y).sqrt() * DVec3::new(turn.cos(), 0.0, turn.sin()) + DVec3::Y * y
-            })
-        };
         let solid_angle = 4.0 * PI / COUNT as f64;
         let mut blurred = [0; 3].map(|_| vec![0.0; 16]);
-        for direction in lattice() {
+        for direction in even_directions(COUNT) {
             let light = sky(direction).to_array();
             let basis = values(4, direction);
             for (channel, light) in blurred.iter_mut().zip(light) {
@@ -188,7 +182,7 @@ mod tests {
             let mut shares = [0.0; CELLS];
             let mut transfer = [0.0_f32; 16];
             let mut wanted = DVec3::ZERO;
-            for direction in lattice().filter(|d| is_free(*d) && d.dot(normal) > 0.0) {
+            for direction in even_directions(COUNT).filter(|d| is_free(*d) && d.dot(normal) > 0.0) {
                 let weight = solid_angle * direction.dot(normal);
                 shares[cell(direction.as_vec3a())] += (weight / PI) as f32;
                 let local = values(4, turn.inverse() * direction);

@@ -134,6 +134,7 @@ pub struct SceneVolume {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::sh::quadrature::even_directions;
 
     /// A linear function comes back as it is, and counts in full wherever the box was wanted.
     #[test]
@@ -165,7 +166,7 @@ mod tests {
         let mut depths = vec![0.0_f32; nodes.count() * DEPTHS];
         for node in 0..nodes.count() {
             let from = nodes.node(node as u32);
-            for ray in (0..512).map(|i| fibonacci(i, 512)) {
+            for ray in even_directions(512) {
                 let texel = &mut depths[node * DEPTHS + depth_texel(ray)];
                 *texel = texel.max(depth(from, ray));
             }
@@ -183,11 +184,5 @@ mod tests {
         }
         let [before, on, behind] = means;
         assert!(before > 0.999 && on > 0.93 && behind < 0.05, "{means:?}");
-    }
-
-    fn fibonacci(i: usize, count: usize) -> DVec3 {
-        let z = 1.0 - (2.0 * i as f64 + 1.0) / count as f64;
-        let turn = i as f64 * 2.399963;
-        (1.0 - z * z).sqrt() * DVec3::new(turn.cos(), turn.sin(), 0.0) + z * DVec3::Z
     }
 }

@@ -49,6 +49,16 @@ pub fn sphere_rule(degree: usize) -> Vec<(DVec3, f64)> {
     rule
 }
 
+/// Unit directions all over the sphere, of equal areas: a Fibonacci lattice.
+pub fn even_directions(count: usize) -> impl Iterator<Item = DVec3> {
+    (0..count).map(move |i| {
+        let z = 1.0 - (2.0 * i as f64 + 1.0) / count as f64;
+        let (sin, cos) = (2.399963229728653 * i as f64).sin_cos();
+        let radius = (1.0 - z * z).sqrt();
+        DVec3::new(radius * cos, radius * sin, z)
+    })
+}
+
 pub fn random_direction(rng: &mut fastrand::Rng) -> DVec3 {
     let z = 2.0 * rng.f64() - 1.0;
     let azimuth = 2.0 * PI * rng.f64();

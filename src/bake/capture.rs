@@ -96,12 +96,6 @@ impl Capture {
             .map(|file| ShaderPermutation::new(file, 4).define("RADIANCE", kind == FieldKind::Radiance))
     }
 
-    fn columns(device: &Device, face_px: u32, kind: FieldKind) -> u32 {
-        let atlas_px = ATLAS_PX.min(device.most_image_px());
-        // The texels of a radiance capture are 16 times as large. Six faces always fit.
-        (if kind == FieldKind::Radiance { atlas_px / 2 } else { atlas_px } / face_px).max(3)
-    }
-
     /// Captures of a model in faces of `face_px`. Those that cannot be computed are drawn. `Input` when a face is
     /// larger than the device's images.
     pub fn new(
@@ -112,40 +106,31 @@ impl Capture {
         kind: FieldKind,
         way: Way,
     ) -> Result<Self> {
-        let columns = Self::columns(device, face_px, kind);
-        let edge = columns * face_px;
+        let radiance = kind == FieldKind::Radiance;
         let most = device.most_image_px();
+        let atlas_px = ATLAS_PX.min(most);
+        // The texels of a radiance capture are 16 times as large. Six faces always fit.
+        let columns = (if radiance { atlas_px / 2 } else { atlas_px } / face_px).max(3);
+        let edge = columns * face_px;
         if edge > most {
             return Err(Error::Input(format!(
                 "cube faces of {face_px} px take images of {edge} px, the device's have at most {most} px"
             )));
         }
-        let radiance = kind == FieldKind::Radiance;
         let format = if radiance { vk::Format::R32G32B32A32_SFLOAT } else { vk::Format::R8_UNORM };
         let shape = ImageShape { format, width: edge, height: edge, samples: 1 };
         let computed = way == Way::Computed && !radiance && Raster::serves(face_px) && Raster::holds(device, &model);
         let writer = if computed {
             Writer::Computed(Raster::new(device, library, face_px, columns)?)
         } else {
-            let depth_shape = ImageShape { format: vk::Format::D32_SFLOAT, ..shape };
-            let depth = radiance.then(|| Image::new(device, "capture depth", depth_shape)).transpose()?;
-            Writer::Drawn { pipeline: Self::pipeline(device, library, format, kind)?, depth }
+            let depth_format = radiance.then_some(vk::Format::D32_SFLOAT);
+            let depth_image = |format| Image::new(device, "capture depth", ImageShape { format, ..shape });
+            let depth = depth_format.map(depth_image).transpose()?;
+            let [vertex, fragment] = Self::rows(kind).map(|row| library.shader(&row));
+            let state = GraphicsState { depth: depth_format, ..GraphicsState::plain(format) };
+            Writer::Drawn { pipeline: GraphicsPipeline::new(device, "capture", &vertex?, &fragment?, state)?, depth }
         };
         Ok(Capture { model, writer, atlas: Image::new(device, "capture atlas", shape)?, face_px, columns, kind })
-    }
-
-    fn pipeline(
-        device: &Arc<Device>,
-        library: &Library,
-        color: vk::Format,
-        kind: FieldKind,
-    ) -> Result<GraphicsPipeline> {
-        let [vertex, fragment] = Self::rows(kind);
-        let state = GraphicsState {
-            depth: (kind == FieldKind::Radiance).then_some(vk::Format::D32_SFLOAT),
-            ..GraphicsState::plain(color)
-        };
-        GraphicsPipeline::new(device, "capture", &library.shader(&vertex)?, &library.shader(&fragment)?, state)
     }
 
     pub fn capacity(&self) -> u32 {

@@ -96,12 +96,6 @@ fn faces(mesh: &Mesh) -> Vec<[f32; 4]> {
     found
 }
 
-fn frames(mesh: &Mesh, nodes: &NodeGrid, count: usize) -> Vec<MapFrame> {
-    let positions: Vec<DVec3> = unit_positions(mesh).iter().map(|p| p.as_dvec3()).collect();
-    let maps = (0..count).into_par_iter();
-    maps.map(|map| MapFrame::around(nodes.map_direction(map), &positions)).collect()
-}
-
 /// What parallel light sees of an object, or of half of it.
 struct View {
     /// Pixels along an edge.
@@ -277,9 +271,11 @@ pub fn bake_silhouette(
     let started = Instant::now();
     let header = silhouette_header(mesh, options);
     header.validate()?;
-    let frames = frames(mesh, &NodeGrid::new(options.cells), header.map_count());
-    let triangles = drawn_triangles(baker, mesh, &header, &frames)?;
     let positions: Vec<DVec3> = unit_positions(mesh).iter().map(|p| p.as_dvec3()).collect();
+    let nodes = NodeGrid::new(options.cells);
+    let frame = |map: usize| MapFrame::around(nodes.map_direction(map), &positions);
+    let frames: Vec<MapFrame> = (0..header.map_count()).into_par_iter().map(frame).collect();
+    let triangles = drawn_triangles(baker, mesh, &header, &frames)?;
     let sides = if header.half_px > 0 { &Side::ALL[..] } else { &Side::ALL[..1] };
     let texels = |frame: &MapFrame| -> Vec<u8> {
         let place = |p: &DVec3| frame.place(*p).extend(p.dot(frame.direction)).as_vec3();
@@ -295,9 +291,7 @@ pub fn bake_silhouette(
     for (number, some) in frames.chunks(MAPS_AT_ONCE).enumerate() {
         let maps: Vec<Vec<u8>> = some.par_iter().map(texels).collect();
         for (frame, texels) in some.iter().zip(maps) {
-            for number in [frame.centre.x, frame.centre.y, frame.half.x, frame.half.y] {
-                payload.extend((number as f32).to_le_bytes());
-            }
+            payload.extend_from_slice(bytemuck::bytes_of(&[frame.centre, frame.half].map(|of| of.as_vec2())));
             payload.extend(texels);
         }
         progress((number * MAPS_AT_ONCE + some.len()) as u32, frames.len() as u32);

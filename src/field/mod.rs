@@ -108,13 +108,10 @@ impl ShadowField {
     pub fn stored(&self, sample: u32, channel: usize, coefficient: usize) -> f64 {
         let header = &self.header;
         let at = sample as usize * header.sample_stride() + channel * header.channel_stride() + coefficient;
+        let bytes = &self.payload[at * header.storage.bytes()..][..header.storage.bytes()];
         let raw = match header.storage {
-            Storage::F32 => {
-                f64::from(f32::from_le_bytes(self.payload[4 * at..4 * at + 4].try_into().expect("four bytes")))
-            }
-            Storage::F16 => {
-                f16::from_le_bytes(self.payload[2 * at..2 * at + 2].try_into().expect("two bytes")).to_f64()
-            }
+            Storage::F32 => f64::from(bytemuck::pod_read_unaligned::<f32>(bytes)),
+            Storage::F16 => bytemuck::pod_read_unaligned::<f16>(bytes).to_f64(),
         };
         raw * f64::from(header.radiance_scale)
     }

@@ -29,7 +29,7 @@ pub use super::silhouette_header::{FACES_LIMIT, Side, SilhouetteHeader};
 use super::silhouette_nodes::{Cell, NodeGrid};
 use super::sub_light::{LIMIT_OUTLINE, SeenLight};
 use crate::error::{Error, Result};
-use glam::{DVec2, DVec3};
+use glam::{DVec2, DVec3, Vec2};
 use std::f64::consts::PI;
 use std::path::Path;
 
@@ -183,10 +183,8 @@ impl SilhouetteField {
         let nodes = NodeGrid::new(header.cells);
         let mut frames = Vec::with_capacity(header.map_count());
         for (index, map) in payload.chunks_exact(header.map_bytes()).enumerate() {
-            let number =
-                |i: usize| f64::from(f32::from_le_bytes(map[4 * i..4 * i + 4].try_into().expect("four bytes")));
-            let centre = DVec2::new(number(0), number(1));
-            let half = DVec2::new(number(2), number(3));
+            let [centre, half]: [Vec2; 2] = bytemuck::pod_read_unaligned(&map[..16]);
+            let [centre, half] = [centre, half].map(|of| of.as_dvec2());
             if !(centre.is_finite() && half.is_finite() && half.min_element() > 0.0 && half.max_element() < 4.0) {
                 return Err(Error::Input(format!("the rectangle of map {index} is not usable")));
             }

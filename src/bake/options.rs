@@ -53,13 +53,6 @@ impl Default for Options {
     }
 }
 
-impl Options {
-    /// The share of a texel by which captures of a mesh without colours may miss it.
-    pub(super) fn level_texels(&self, mesh: &Mesh) -> f64 {
-        if self.levels { levels::texels(mesh) } else { 0.0 }
-    }
-}
-
 /// The first shell that an object needs, in the lattice's space. It lies just off an object that fills a ball. If the
 /// centre is inside another solid, it lies at the distance of the surface from the centre, since no receiver comes
 /// nearer. Otherwise it is [`ROOMY_INNER`].
@@ -104,7 +97,7 @@ pub fn header(mesh: &Mesh, kind: FieldKind, options: &Options) -> FieldHeader {
         storage: options.storage,
         lattice,
         face_px: options.face_px,
-        level_texels: if kind == FieldKind::Occlusion { options.level_texels(mesh) } else { 0.0 },
+        level_texels: if kind == FieldKind::Occlusion && options.levels { levels::texels(mesh) } else { 0.0 },
         filled_samples: 0,
         captured_samples: 0,
         centre_m: centre.to_array(),

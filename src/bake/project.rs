@@ -9,11 +9,11 @@ use crate::error::{Error, Result};
 use crate::field::quantity::{FieldKind, channel_stride};
 use crate::gpu::memory::TexelView;
 use crate::gpu::{Bind, Buffer, Commands, ComputePipeline, Device, Image};
+use crate::layout::QUAD_FORMAT;
 use crate::sh;
 use crate::sh::basis::coefficient_count;
 use crate::sh::cube::{solid_angle, texel_st};
 use crate::shaders::{Library, ShaderPermutation};
-use ash::vk;
 use bytemuck::{Pod, Zeroable};
 use glam::DVec3;
 use std::sync::Arc;
@@ -71,7 +71,7 @@ impl Project {
         let shader = library.shader(&Self::row(bands, kind))?;
         let pipeline = ComputePipeline::new(device, "project", &shader)?;
         let texels = Buffer::with_data(device, "project texels", &texel_table(face_px as usize))?;
-        if !TexelView::fits(device, TEXEL_FORMAT, texels.size_bytes) {
+        if !TexelView::fits(device, QUAD_FORMAT, texels.size_bytes) {
             let most = device.limits.max_texel_buffer_elements;
             return Err(Error::Input(format!(
                 "cube faces of {face_px} px have more texels than the device's views hold ({most})"
@@ -89,13 +89,11 @@ impl Project {
         sample_count: u32,
     ) -> Result<()> {
         let push = Push { face_px: self.face_px, atlas_columns: self.columns };
-        let texels = TexelView::new(&self.texels, TEXEL_FORMAT)?;
+        let texels = TexelView::new(&self.texels, QUAD_FORMAT)?;
         let resources = [Bind::Image(atlas), Bind::Buffer(samples), Bind::Texel(texels), Bind::Buffer(coefficients)];
         commands.dispatch(&self.pipeline, &resources, &push, [sample_count * self.pipeline.local_size[0], 1, 1])
     }
 }
-
-const TEXEL_FORMAT: vk::Format = vk::Format::R32G32B32A32_SFLOAT;
 
 /// For every texel of a face its direction along right, down and forward, and its solid angle.
 fn texel_table(face_px: usize) -> Vec<[f32; 4]> {

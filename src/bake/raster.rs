@@ -9,6 +9,7 @@ use super::model::{DrawnFace, Model};
 use crate::error::Result;
 use crate::gpu::memory::TexelView;
 use crate::gpu::{Access, Bind, Buffer, BufferKind, Commands, ComputePipeline, Device, Image};
+use crate::layout::QUAD_FORMAT;
 use crate::sh::cube::face_basis;
 use crate::shaders::{Library, ShaderPermutation};
 use ash::vk;
@@ -21,7 +22,6 @@ use std::sync::Arc;
 const WORKGROUP: u32 = 8;
 /// Words of shared memory, one bit for each texel: a face of 168 px.
 const WORDS: u32 = 1024;
-const POSITION_FORMAT: vk::Format = vk::Format::R32G32B32A32_SFLOAT;
 const INDEX_FORMAT: vk::Format = vk::Format::R32_UINT;
 
 /// A face, where it goes, and its ranges of indices.
@@ -104,7 +104,7 @@ impl Raster {
     }
 
     pub(super) fn holds(device: &Device, model: &Model) -> bool {
-        TexelView::fits(device, POSITION_FORMAT, model.positions.size_bytes)
+        TexelView::fits(device, QUAD_FORMAT, model.positions.size_bytes)
             && TexelView::fits(device, INDEX_FORMAT, model.indices.size_bytes)
     }
 
@@ -131,7 +131,7 @@ impl Raster {
         let resources = [
             Bind::Buffer(&faces.faces),
             Bind::Buffer(&faces.ranges),
-            Bind::Texel(TexelView::new(&model.positions, POSITION_FORMAT)?),
+            Bind::Texel(TexelView::new(&model.positions, QUAD_FORMAT)?),
             Bind::Texel(TexelView::new(&model.indices, INDEX_FORMAT)?),
             Bind::Buffer(&self.texels),
         ];

@@ -75,41 +75,11 @@ struct Siblings {
     chunks: Range<u32>,
 }
 
-/// Which chunk is drawn in whose place.
-pub(super) struct Levels {
-    groups: Vec<Group>,
-    siblings: Vec<Siblings>,
-    indices: Vec<u32>,
-}
-
-impl Levels {
-    /// Puts ranges of the chunks that are drawn under a tolerance into `chosen`, in order.
-    pub fn choose(&self, tolerance: Tolerance, chosen: &mut Vec<Range<u32>>) {
-        chosen.clear();
-        for group in self.groups.iter().filter(|group| tolerance.forbids(&group.bounds)) {
-            for Siblings { from, chunks } in &self.siblings[group.siblings.clone()] {
-                if !from.is_some_and(|group| tolerance.forbids(&self.groups[group].bounds)) {
-                    chosen.push(chunks.clone());
-                }
-            }
-        }
-        chosen.sort_unstable_by_key(|chunks| chunks.start);
-    }
-
-    /// Adds the indices of ranges to `indices`, and returns the range that they are there.
-    pub fn gathered(&self, ranges: &[Range<u32>], indices: &mut Vec<u32>) -> Vec<Range<u32>> {
-        let start = indices.len() as u32;
-        for range in ranges {
-            indices.extend_from_slice(&self.indices[range.start as usize..range.end as usize]);
-        }
-        let end = indices.len() as u32;
-        if start < end { vec![start..end] } else { Vec::new() }
-    }
-}
-
+/// A mesh cut into chunks of all levels, and which chunk is drawn in whose place.
 pub(super) struct Leveled {
     pub chunked: Chunked,
-    pub levels: Levels,
+    groups: Vec<Group>,
+    siblings: Vec<Siblings>,
 }
 
 impl Leveled {
@@ -144,14 +114,37 @@ impl Leveled {
             groups.push(Group { bounds: group.simplified, siblings: first..siblings.len() });
             groups.len() as i32 - 1
         });
-        let indices = chunked.triangles.as_flattened().to_vec();
-        Ok(Leveled { chunked, levels: Levels { groups, siblings, indices } })
+        Ok(Leveled { chunked, groups, siblings })
+    }
+
+    /// Puts ranges of the chunks that are drawn under a tolerance into `chosen`, in order.
+    pub fn choose(&self, tolerance: Tolerance, chosen: &mut Vec<Range<u32>>) {
+        chosen.clear();
+        for group in self.groups.iter().filter(|group| tolerance.forbids(&group.bounds)) {
+            for Siblings { from, chunks } in &self.siblings[group.siblings.clone()] {
+                if !from.is_some_and(|group| tolerance.forbids(&self.groups[group].bounds)) {
+                    chosen.push(chunks.clone());
+                }
+            }
+        }
+        chosen.sort_unstable_by_key(|chunks| chunks.start);
+    }
+
+    /// Adds the indices of ranges to `indices`, and returns the range that they are there.
+    pub fn gathered(&self, ranges: &[Range<u32>], indices: &mut Vec<u32>) -> Vec<Range<u32>> {
+        let start = indices.len() as u32;
+        for range in ranges {
+            let all = self.chunked.triangles.as_flattened();
+            indices.extend_from_slice(&all[range.start as usize..range.end as usize]);
+        }
+        let end = indices.len() as u32;
+        if start < end { vec![start..end] } else { Vec::new() }
     }
 
     /// Triangles that are drawn under a tolerance, by their corners among the mesh's vertices.
     pub fn drawn(&self, tolerance: Tolerance) -> Vec<[u32; 3]> {
         let mut chosen = Vec::new();
-        self.levels.choose(tolerance, &mut chosen);
+        self.choose(tolerance, &mut chosen);
         let drawn = chosen.into_iter().flatten().flat_map(|chunk| self.chunked.triangles_of(chunk as usize));
         drawn.map(|triangle| triangle.map(|vertex| self.chunked.vertices[vertex as usize])).collect()
     }

@@ -67,7 +67,7 @@ impl Model {
     ) -> impl Iterator<Item = &'m Chunk> {
         let chunks = match &self.cut {
             Cut::Levels(leveled) => {
-                leveled.levels.choose(Tolerance::capture(eye, face_px), buffer);
+                leveled.choose(Tolerance::capture(eye, face_px), buffer);
                 &leveled.chunked.chunks
             }
             Cut::Whole(chunks) => {
@@ -99,7 +99,7 @@ impl Model {
         let mut gathered = Vec::new();
         if let Cut::Levels(leveled) = &self.cut {
             for face in faces {
-                face.ranges = leveled.levels.gathered(&face.ranges, &mut gathered);
+                face.ranges = leveled.gathered(&face.ranges, &mut gathered);
             }
         }
         if gathered.is_empty() {

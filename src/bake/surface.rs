@@ -37,8 +37,6 @@ struct SurfaceNode {
 pub struct Surface {
     triangles: Vec<[DVec3; 3]>,
     nodes: Vec<SurfaceNode>,
-    low: DVec3,
-    high: DVec3,
 }
 
 impl Surface {
@@ -47,8 +45,7 @@ impl Surface {
         let mut order = triangles.to_vec();
         sort_spatially(positions, &mut order);
         let triangles: Vec<[DVec3; 3]> = order.iter().map(|t| t.map(|i| positions[i as usize].as_dvec3())).collect();
-        let (low, high) = bounds(&triangles);
-        let mut surface = Surface { triangles, nodes: Vec::new(), low, high };
+        let mut surface = Surface { triangles, nodes: Vec::new() };
         if !surface.triangles.is_empty() {
             surface.build(0..surface.triangles.len());
         }
@@ -106,8 +103,8 @@ impl Surface {
 
     /// Whether a point lies inside the solid that the surface bounds.
     pub fn encloses(&self, point: DVec3) -> bool {
-        let boxed = point.cmpge(self.low).all() && point.cmple(self.high).all();
-        boxed && self.winding_number(point) > INSIDE
+        let is_boxed = |all: &SurfaceNode| point.cmpge(all.low).all() && point.cmple(all.high).all();
+        self.nodes.first().is_some_and(is_boxed) && self.winding_number(point) > INSIDE
     }
 
     /// The generalised winding number around a point. It is 1 inside and 0 outside a closed mesh, and in between near

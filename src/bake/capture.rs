@@ -232,35 +232,6 @@ impl Capture {
     }
 }
 
-/// The CPU twin of an occlusion capture, by another method: it casts a ray through every texel centre of one face. The
-/// result is row-major and true where a ray hits the object. Positions are those of
-/// [`super::triangles::unit_positions`].
-pub fn twin(positions: &[Vec3], triangles: &[[u32; 3]], eye: DVec3, face: usize, face_px: u32) -> Vec<bool> {
-    let mut covered = vec![false; (face_px * face_px) as usize];
-    rays(positions, triangles, eye, face, face_px, |texel, _, _| covered[texel] = true);
-    covered
-}
-
-/// The CPU twin of a radiance capture: the colour of the nearest triangle that each ray meets, or black where it meets
-/// none.
-pub fn twin_colors(
-    positions: &[Vec3],
-    colors: &[Vec3],
-    triangles: &[[u32; 3]],
-    eye: DVec3,
-    face: usize,
-    face_px: u32,
-) -> Vec<DVec3> {
-    let mut nearest = vec![(f64::INFINITY, DVec3::ZERO); (face_px * face_px) as usize];
-    rays(positions, triangles, eye, face, face_px, |texel, triangle, (distance, weights)| {
-        if distance < nearest[texel].0 {
-            let corners = triangle.map(|i| colors[i as usize].as_dvec3());
-            nearest[texel] = (distance, corners.iter().zip(weights).map(|(color, weight)| *color * weight).sum());
-        }
-    });
-    nearest.into_iter().map(|(_, color)| color).collect()
-}
-
 /// The rows or columns of a face in which rays may meet a triangle, by one coordinate of its corners and their depths.
 fn reach(sides: [f64; 3], depths: [f64; 3], px: usize) -> Range<usize> {
     if depths.iter().any(|depth| *depth <= 0.0) {
@@ -272,18 +243,20 @@ fn reach(sides: [f64; 3], depths: [f64; 3], px: usize) -> Range<usize> {
     (first.max(0.0) as usize).min(px)..(end.max(0.0) as usize).min(px)
 }
 
-/// Calls a function for every ray and triangle that meet: with the distance in units of the ray's (s, t, 1), and with
-/// the point's weights among the triangle's corners.
-fn rays(
+/// The CPU twin of a capture, by another method: it casts a ray through every texel centre of one face. Row by row the
+/// corners of the nearest triangle that each meets, and the place's weights among them. Positions are those of
+/// [`super::triangles::unit_positions`].
+pub fn twin(
     positions: &[Vec3],
     triangles: &[[u32; 3]],
     eye: DVec3,
     face: usize,
     face_px: u32,
-    mut met: impl FnMut(usize, &[u32; 3], (f64, [f64; 3])),
-) {
+) -> Vec<Option<([u32; 3], [f64; 3])>> {
     let (forward, right, down) = face_basis(face);
     let px = face_px as usize;
+    // With distances in units of the ray's (s, t, 1).
+    let mut nearest = vec![(f64::INFINITY, None); px * px];
     for triangle in triangles {
         // The triangle stands in the face's frame, where the direction of a ray is (s, t, 1).
         let [a, b, c] = triangle.map(|i| {
@@ -304,11 +277,13 @@ fn rays(
                 let sides = edges.map(|edge| edge.dot(ray));
                 let same = sides.iter().all(|s| *s >= 0.0) || sides.iter().all(|s| *s <= 0.0);
                 let along = plane.dot(ray);
-                if same && offset * along > 0.0 {
+                let texel = &mut nearest[y * px + x];
+                if same && offset * along > 0.0 && offset / along < texel.0 {
                     let sum: f64 = sides.iter().sum();
-                    met(y * px + x, triangle, (offset / along, sides.map(|side| side / sum)));
+                    *texel = (offset / along, Some((*triangle, sides.map(|side| side / sum))));
                 }
             }
         }
     }
+    nearest.into_iter().map(|(_, met)| met).collect()
 }

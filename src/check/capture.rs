@@ -128,7 +128,8 @@ pub fn coverage(baker: &Baker, mesh: &Mesh, eyes: &[Vec3], face_px: u32, way: Wa
     let mut out = Coverage::default();
     for (eye, faces) in eyes.iter().zip(faces::<u8>(baker, mesh, eyes, (face_px, FieldKind::Occlusion, true), way)?) {
         for (face, texels) in faces.iter().enumerate() {
-            let wanted = capture::twin(&positions, &mesh.triangles, eye.as_dvec3(), face, face_px);
+            let met = capture::twin(&positions, &mesh.triangles, eye.as_dvec3(), face, face_px);
+            let wanted: Vec<bool> = met.iter().map(Option::is_some).collect();
             let Some(texels) = texels else {
                 out.left_out += 1;
                 out.left_out_wrongly += usize::from(wanted.iter().any(|c| *c));
@@ -164,7 +165,12 @@ pub fn colors(baker: &Baker, mesh: &Mesh, eyes: &[Vec3], face_px: u32) -> Result
         eyes.iter().zip(faces::<[f32; 4]>(baker, mesh, eyes, (face_px, FieldKind::Radiance, true), Way::Drawn)?)
     {
         for (face, found) in faces.iter().enumerate() {
-            let expected = capture::twin_colors(&positions, colors, &mesh.triangles, eye.as_dvec3(), face, face_px);
+            let color = |(corners, weights): ([u32; 3], [f64; 3])| {
+                let corners = corners.map(|i| colors[i as usize].as_dvec3());
+                corners.iter().zip(weights).map(|(color, weight)| *color * weight).sum::<DVec3>()
+            };
+            let met = capture::twin(&positions, &mesh.triangles, eye.as_dvec3(), face, face_px);
+            let expected: Vec<DVec3> = met.into_iter().map(|met| met.map_or(DVec3::ZERO, color)).collect();
             for (i, wanted) in expected.iter().enumerate() {
                 let found = found.as_ref().map_or([0.0; 3], |texels| [texels[i][0], texels[i][1], texels[i][2]]);
                 let found = Vec3::from_array(found).as_dvec3();

@@ -102,9 +102,9 @@ fn samples_in_the_tube_are_filled_from_outside() {
         }
         // What it holds is what rays see from there.
         let px = field.header.face_px;
-        let faces: Vec<Vec<bool>> = (0..6).map(|f| capture::twin(&unit, &mesh.triangles, eye, f, px)).collect();
+        let faces: Vec<_> = (0..6).map(|f| capture::twin(&unit, &mesh.triangles, eye, f, px)).collect();
         let texel = |face: usize, x: usize, y: usize| {
-            let covered: bool = faces[face][y * px as usize + x];
+            let covered = faces[face][y * px as usize + x].is_some();
             [if covered { 0.0 } else { 1.0 }, 0.0, 0.0]
         };
         let scale = lattice.scale(lattice.distance(eye).max(lattice.inner)) as f32;

@@ -49,7 +49,10 @@ const PARTED: f32 = 0.1;
 const GROWTH: f64 = 0.35;
 
 /// A surface in the making. Vertices are only ever added.
-pub(super) struct Refined {
+pub(super) struct Refined<'g> {
+    /// That its points are seen in.
+    space: GroupSpace<'g>,
+    is_flat: bool,
     pub positions: Vec<Vec3>,
     pub normals: Vec<Vec3>,
     pub attributes: Attributes,
@@ -75,9 +78,11 @@ pub(super) fn sides([a, b, c]: [u32; 3]) -> [Edge; 3] {
     [edge(a, b), edge(b, c), edge(c, a)]
 }
 
-impl Refined {
-    pub fn new(mesh: &Mesh) -> Self {
+impl<'g> Refined<'g> {
+    pub fn new(mesh: &Mesh, space: GroupSpace<'g>) -> Self {
         let mut refined = Refined {
+            space,
+            is_flat: mesh.is_flat(),
             positions: Vec::new(),
             normals: mesh.normals.clone(),
             attributes: mesh.attributes(),
@@ -101,9 +106,9 @@ impl Refined {
 
     /// Gives every vertex of a plane that something divides, as a roof does the wall above it from that below, a copy for
     /// each side.
-    pub fn part(&mut self, space: &GroupSpace<'_>) {
+    fn part(&mut self) {
         let around = triangles_around(self.positions.len(), &self.triangles);
-        let nudges = space.nudges(&self.positions, &self.normals, &self.triangles);
+        let nudges = self.space.nudges(&self.positions, &self.normals, &self.triangles);
         // For each vertex the triangles of every side.
         let sides = |v: usize| -> Vec<Vec<u32>> {
             let normal = self.normals[v];
@@ -121,7 +126,7 @@ impl Refined {
                 self.positions[v].lerp(middle, PARTED) + nudges[v].dot(normal) * normal
             };
             for &of in &around[v] {
-                let is_beside = |side: &&mut Vec<u32>| !space.is_between(inside(side[0]), inside(of));
+                let is_beside = |side: &&mut Vec<u32>| !self.space.is_between(inside(side[0]), inside(of));
                 match sides.iter_mut().find(is_beside) {
                     Some(side) => side.push(of),
                     None => sides.push(vec![of]),
@@ -174,9 +179,9 @@ impl Refined {
 
     /// Casts rays from the vertices that have no transfer vector yet, and from the middles of edges longer than
     /// `least_m`.
-    fn look(&mut self, space: &GroupSpace<'_>, least_m: f32) {
-        let nudges = space.nudges(&self.positions, &self.normals, &self.triangles);
-        let Refined { transfers, positions, normals, .. } = self;
+    fn look(&mut self, least_m: f32) {
+        let nudges = self.space.nudges(&self.positions, &self.normals, &self.triangles);
+        let Refined { space, transfers, positions, normals, .. } = self;
         transfers.par_iter_mut().enumerate().for_each(|(v, transfer)| {
             transfer.get_or_insert_with(|| {
                 let place = Place { position: positions[v], normal: normals[v], nudge: nudges[v], edge: 0.0 };
@@ -186,6 +191,7 @@ impl Refined {
         let mut edges: Vec<Edge> = self.edges().into_iter().collect();
         edges.retain(|edge| !self.middles.contains_key(edge) && self.length(*edge) > least_m);
         edges.sort_unstable();
+        let space = &self.space;
         let transfer_of = |v: usize| self.transfers[v].as_ref().expect("rays are cast from every vertex above");
         let middle = |&(a, b): &Edge| {
             let [a_index, b_index] = [a as usize, b as usize];
@@ -208,10 +214,10 @@ impl Refined {
     }
 
     /// Edges whose middle differs: the difference, the area of the triangles at the edge in the group, and its places.
-    fn candidates(&self, scale: f32) -> Vec<(f32, f32, Edge)> {
+    fn candidates(&self) -> Vec<(f32, f32, Edge)> {
         let mut worst: HashMap<Edge, (f32, f32)> = HashMap::new();
         for triangle in &self.triangles {
-            let area = scale.powi(2) * self.triangle_area(triangle);
+            let area = self.space.scale().powi(2) * self.triangle_area(triangle);
             for edge in sides(*triangle) {
                 let Some((_, difference)) = self.middles.get(&edge) else { continue };
                 let found = worst.entry(self.shared(edge)).or_default();
@@ -224,13 +230,8 @@ impl Refined {
 
     /// The longest edges of triangles on which one of the suns shines in parts, where they are longer than `least_m`, by
     /// their places. `even` keeps triangles that were found not to be.
-    fn half_lit(
-        &self,
-        space: &GroupSpace<'_>,
-        suns: &[DVec3],
-        least_m: f32,
-        even: &mut HashSet<[u32; 3]>,
-    ) -> HashSet<Edge> {
+    fn half_lit(&self, suns: &[DVec3], least_m: f32, even: &mut HashSet<[u32; 3]>) -> HashSet<Edge> {
+        let space = &self.space;
         let nudges = space.nudges(&self.positions, &self.normals, &self.triangles);
         let suns: Vec<(DVec3, Vec3)> = suns.iter().map(|sun| (*sun, space.local(*sun))).collect();
         let is_half_lit = |triangle: &[u32; 3]| {
@@ -253,12 +254,12 @@ impl Refined {
     }
 
     /// Edges that are longer than they are far from the middle of a lamp, and than it is wide from there, by their places.
-    fn beside_lamps(&self, space: &GroupSpace<'_>, least: f32) -> HashSet<Edge> {
-        let lamps = space.lamps();
+    fn beside_lamps(&self, least: f32) -> HashSet<Edge> {
+        let lamps = self.space.lamps();
         if lamps.is_empty() {
             return HashSet::new();
         }
-        let placed: Vec<Vec3> = self.positions.iter().map(|position| space.placed(*position).into()).collect();
+        let placed: Vec<Vec3> = self.positions.iter().map(|position| self.space.placed(*position).into()).collect();
         let is_long = |&(a, b): &Edge| {
             let [from, to] = [a, b].map(|v| placed[v as usize]);
             let length = from.distance(to);
@@ -352,20 +353,20 @@ pub(super) struct Limits {
     pub sun_edge: f32,
 }
 
-fn vertex_count(surfaces: &[(Refined, GroupSpace<'_>, bool)]) -> usize {
-    surfaces.iter().map(|(refined, ..)| refined.positions.len()).sum()
+pub(super) fn vertex_count(surfaces: &[Refined<'_>]) -> usize {
+    surfaces.iter().map(|refined| refined.positions.len()).sum()
 }
 
 /// Splits the edges that `mark` finds of each surface, by its index, until there are none or the budget is spent.
 fn split_marked(
-    surfaces: &mut [(Refined, GroupSpace<'_>, bool)],
+    surfaces: &mut [Refined<'_>],
     budget: usize,
-    mut mark: impl FnMut(usize, &Refined, &GroupSpace<'_>) -> HashSet<Edge>,
+    mut mark: impl FnMut(usize, &Refined<'_>) -> HashSet<Edge>,
 ) {
     loop {
         let mut is_done = true;
-        for (index, (refined, space, _)) in surfaces.iter_mut().enumerate() {
-            let marked = mark(index, refined, space);
+        for (index, refined) in surfaces.iter_mut().enumerate() {
+            let marked = mark(index, refined);
             is_done &= marked.is_empty();
             refined.split(marked);
         }
@@ -375,37 +376,31 @@ fn split_marked(
     }
 }
 
-/// Refines the surfaces of a group together; each comes with the space that its points are seen in. `told` hears how
-/// many vertices there are.
-pub(super) fn refine(
-    surfaces: &mut [(Refined, GroupSpace<'_>, bool)],
-    suns: &[DVec3],
-    limits: &Limits,
-    told: &dyn Fn(usize),
-) {
+/// Refines the surfaces of a group together. `told` hears how many vertices there are.
+pub(super) fn refine(surfaces: &mut [Refined<'_>], suns: &[DVec3], limits: &Limits, told: &dyn Fn(usize)) {
     let start = vertex_count(surfaces);
     if start >= limits.vertices {
         return;
     }
     let share = (limits.vertices - start) / 2;
-    for (refined, space, flat) in surfaces.iter_mut() {
-        refined.part(space);
-        let most = if *flat { limits.flat_edge } else { limits.edge };
+    for refined in surfaces.iter_mut() {
+        refined.part();
+        let most = if refined.is_flat { limits.flat_edge } else { limits.edge };
         let budget = refined.positions.len() + share;
-        refined.cut_longest(most / space.scale(), budget);
+        refined.cut_longest(most / refined.space.scale(), budget);
     }
     // Light falls off by the square of the distance along edges beside lamps: the cord of one would be lit from end to end
     // by the bulb at its lower one.
     let budget = vertex_count(surfaces) + (limits.vertices - start) / LAMPS_SHARE;
-    split_marked(surfaces, budget, |_, refined, space| refined.beside_lamps(space, limits.least_edge));
+    split_marked(surfaces, budget, |_, refined| refined.beside_lamps(limits.least_edge));
     let cut = vertex_count(surfaces);
     if !suns.is_empty() {
         let budget = cut + (limits.vertices - start) / SUNS_SHARE;
         // The light that bounces off a surface is that of its vertices: through a window between two of them no sun would
         // come in, and through one with a vertex it would shine on all that is nearest to that.
         let mut even = vec![HashSet::new(); surfaces.len()];
-        split_marked(surfaces, budget, |index, refined, space| {
-            refined.half_lit(space, suns, limits.sun_edge / space.scale(), &mut even[index])
+        split_marked(surfaces, budget, |index, refined| {
+            refined.half_lit(suns, limits.sun_edge / refined.space.scale(), &mut even[index])
         });
     }
     log::debug!(
@@ -413,7 +408,7 @@ pub(super) fn refine(
         vertex_count(surfaces),
         limits.vertices
     );
-    let area: f32 = surfaces.iter().map(|(refined, space, _)| refined.area() * space.scale().powi(2)).sum();
+    let area: f32 = surfaces.iter().map(|refined| refined.area() * refined.space.scale().powi(2)).sum();
     loop {
         let before = vertex_count(surfaces);
         told(before);
@@ -421,9 +416,9 @@ pub(super) fn refine(
             break;
         }
         let mut candidates = Vec::new();
-        for (index, (refined, space, _)) in surfaces.iter_mut().enumerate() {
-            refined.look(space, limits.least_edge / space.scale());
-            let found = refined.candidates(space.scale()).into_iter();
+        for (index, refined) in surfaces.iter_mut().enumerate() {
+            refined.look(limits.least_edge / refined.space.scale());
+            let found = refined.candidates().into_iter();
             candidates.extend(found.filter(|(difference, ..)| *difference > LEAST_DIFFERENCE).map(|c| (index, c)));
         }
         let weight = |(_, (difference, area, _)): &(usize, (f32, f32, Edge))| difference * area;
@@ -437,7 +432,7 @@ pub(super) fn refine(
         if candidates.is_empty() {
             break;
         }
-        for (index, (refined, ..)) in surfaces.iter_mut().enumerate() {
+        for (index, refined) in surfaces.iter_mut().enumerate() {
             let marked: HashSet<Edge> = candidates.iter().filter(|c| c.0 == index).map(|c| c.1.2).collect();
             if !marked.is_empty() {
                 refined.split(marked);

@@ -5,7 +5,7 @@ use super::cluster_order::{ClusterOrder, cluster_order};
 use super::links::{Link, Met, Runs, links, side};
 use super::own_visibility::{Counts, Eye, Front, PATTERN, Rays, Seen, Standing, Target, directions, see};
 use super::packet::{BlockerHit, BlockerTriangle, Blockers, Mask};
-use super::refine::{FLAT, Limits, ON_TRIANGLE, Refined, refine, sides};
+use super::refine::{FLAT, Limits, ON_TRIANGLE, Refined, refine, sides, vertex_count};
 use super::triangles::{distinct, weights};
 use super::visibility_volume::VolumePlan;
 use super::{BakeReport, Options, Progress, TRANSFER_OFFSET, Wanted, bakes_transfer};
@@ -420,19 +420,16 @@ impl GroupPlan {
         let group = Group::new(self);
         let receivers: Vec<usize> = (0..self.members.len()).filter(|&i| self.members[i].receives).collect();
         let refining = receivers.iter().copied().filter(|&i| self.members[i].refines);
-        let mut refined: Vec<(Refined, GroupSpace<'_>, bool)> = refining
-            .clone()
-            .map(|i| (Refined::new(&self.members[i].mesh), group.space(i), self.members[i].mesh.is_flat()))
-            .collect();
-        let start = refined.iter().map(|(refined, ..)| refined.positions.len()).sum();
-        if let Some(limits) = self.limits(&group, start).filter(|_| !refined.is_empty()) {
+        let mut refined: Vec<Refined<'_>> =
+            refining.clone().map(|i| Refined::new(&self.members[i].mesh, group.space(i))).collect();
+        if let Some(limits) = self.limits(&group, vertex_count(&refined)).filter(|_| !refined.is_empty()) {
             let most = limits.vertices.max(1) as u32;
             let suns: Vec<DVec3> = self.suns.iter().map(|sun| sun.toward).collect();
             refine(&mut refined, &suns, &limits, &|count| progress((count as u32).min(most) / 2, most));
         }
         let mut surfaces = self.plain();
         let mut parents: Vec<Option<Vec<u32>>> = vec![None; surfaces.len()];
-        for (member, (mut refined, ..)) in refining.zip(refined) {
+        for (member, mut refined) in refining.zip(refined) {
             let own = &self.members[member].mesh;
             if refined.positions.len() != own.positions.len() {
                 parents[member] = Some(std::mem::take(&mut refined.parents));

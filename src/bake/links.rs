@@ -67,7 +67,7 @@ pub fn macros(row: ShaderPermutation) -> ShaderPermutation {
 #[derive(Clone, Debug)]
 pub struct Runs {
     members: Vec<MemberRuns>,
-    count: u32,
+    pub count: u32,
     /// Of every run, whether it has vertices of different sides, as of both faces of a wall; empty where links are known.
     pub mixed: Vec<bool>,
 }
@@ -115,10 +115,6 @@ impl Runs {
         };
         let members = members.into_iter().map(member).collect();
         Runs { members, count, mixed: Vec::new() }
-    }
-
-    pub fn count(&self) -> u32 {
-        self.count
     }
 
     /// The number of the run of a size that was met.
@@ -323,8 +319,8 @@ mod tests {
     #[test]
     fn links_keep_the_share_of_all_rays_and_split_where_it_is_large() {
         let runs = plain(&[1000, 70]);
-        assert_eq!(runs.count(), 125 + 16 + 2 + 9 + 2 + 1);
-        assert_eq!(runs.all().count() as u32, runs.count());
+        assert_eq!(runs.count, 125 + 16 + 2 + 9 + 2 + 1);
+        assert_eq!(runs.all().count() as u32, runs.count);
         assert_eq!(runs.all().last(), Some((1, 0, 70)));
         let all: Vec<_> = runs.all().collect();
         let sized: Vec<_> = (0..RUNS.len()).flat_map(|size| runs.of_size(size).collect::<Vec<_>>()).collect();

@@ -28,8 +28,8 @@ pub(super) const NARROWED: f64 = 0.5;
 pub(super) struct Boxes {
     texels: bool,
     pub push: BoxPush,
-    of_vertices: HiddenLinks,
-    of_runs: HiddenLinks,
+    /// Those of vertices, then of runs.
+    pub hidden: [HiddenLinks; 2],
 }
 
 pub(super) struct HiddenLinks {
@@ -84,18 +84,12 @@ impl Boxes {
         Ok(Some(Boxes {
             texels: permutation.reads_texels(),
             push: BoxPush { count: boxes.len() as u32, entities, run_count },
-            of_vertices: hidden(of_vertices, false)?,
-            of_runs: hidden(of_runs, true)?,
+            hidden: [hidden(of_vertices, false)?, hidden(of_runs, true)?],
         }))
     }
 
-    /// Those of vertices, then of runs.
-    pub fn hidden(&self) -> [&HiddenLinks; 2] {
-        [&self.of_vertices, &self.of_runs]
-    }
-
     pub fn links(&self) -> [&Buffer; 2] {
-        self.hidden().map(|hidden| &hidden.links)
+        self.hidden.each_ref().map(|hidden| &hidden.links)
     }
 
     /// Writes the links of the vertices of so many clusters, and of all runs, from those that are `baked`.
@@ -108,7 +102,7 @@ impl Boxes {
         [run_places, edges]: [&'r Buffer; 2],
     ) -> Result<()> {
         let threads = [cluster_count * CLUSTER_VERTICES, self.push.run_count];
-        for ((hidden, baked), threads) in self.hidden().into_iter().zip(baked).zip(threads) {
+        for ((hidden, baked), threads) in self.hidden.iter().zip(baked).zip(threads) {
             let resources = [
                 inputs.entities.clone(),
                 Bind::read(self.texels, clusters, vk::Format::R32G32_UINT)?,

@@ -123,7 +123,7 @@ impl Linked {
         for members in rigid {
             let base = linked.run_count as u32;
             let runs = Runs::new(members.iter().map(|&member| entities[member].runs));
-            linked.run_count += runs.count() as usize;
+            linked.run_count += runs.count as usize;
             let block = |(number, (member, first, count)): (u32, (usize, usize, usize))| {
                 let clusters = runs.parts(number);
                 let mut block = RunBlock {
@@ -172,7 +172,7 @@ impl Linked {
 
     /// Whether light bounces between groups.
     fn meets(&self) -> bool {
-        !self.surfaces.is_empty() || (self.receives && !self.far.roots.is_empty())
+        !self.surfaces.movers.is_empty() || (self.receives && !self.far.roots.is_empty())
     }
 
     /// Adds the runs of a group that rests, numbered from `base`.
@@ -479,7 +479,7 @@ impl Bounce {
 
     /// How what it reads of the merge is to be bound, if it reads any.
     pub fn reads(&self) -> Option<&MergePermutation> {
-        self.movers.as_ref().map(Movers::permutation)
+        self.movers.as_ref().map(|movers| &movers.permutation)
     }
 
     /// Adds bounces to the direct light of all vertices, which was written before.

@@ -94,10 +94,6 @@ impl Surfaces {
         }
     }
 
-    pub fn is_empty(&self) -> bool {
-        self.movers.is_empty()
-    }
-
     /// Whether boxes hide links.
     pub fn hide_links(&self) -> bool {
         !self.boxes.is_empty()
@@ -149,7 +145,8 @@ pub(super) struct Movers {
     outgoing: ComputePipeline,
     distant: ComputePipeline,
     movers: ComputePipeline,
-    permutation: MergePermutation,
+    /// Which variant its inputs are to be read by.
+    pub permutation: MergePermutation,
     pub surfaces: Surfaces,
     pub far: FarRuns,
     /// Those that hide links.
@@ -248,11 +245,6 @@ impl Movers {
         boxes.record(commands, inputs, (&self.clusters, self.cluster_count), baked, places)?;
         commands.computed();
         Ok(())
-    }
-
-    /// Which variant its inputs are to be read by.
-    pub fn permutation(&self) -> &MergePermutation {
-        &self.permutation
     }
 
     /// Writes what every vertex receives from other groups, after the light of all runs was written. What moves reflects

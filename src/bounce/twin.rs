@@ -263,7 +263,7 @@ impl Movers {
         };
         let runs: Vec<_> = places.iter().enumerate().map(of_run).collect();
         let lists = [&mut host.of_vertices, &mut host.of_runs];
-        for ((list, hidden), receivers) in lists.into_iter().zip(boxes.hidden()).zip([vertices, runs]) {
+        for ((list, hidden), receivers) in lists.into_iter().zip(&boxes.hidden).zip([vertices, runs]) {
             let directions: Vec<u32> = hidden.directions.download(list.links.len())?;
             let of_receiver = |&(place, position, normal): &(usize, DVec3, DVec3)| {
                 let (first, _, count) = list.range(place);
@@ -346,7 +346,7 @@ impl Movers {
                     let to_object = object.rotation.inverse();
                     let from = to_object * (vertex.position - object.centre) / object.radius_m;
                     let (blocked, direction) = blocked_from(object, from);
-                    let cosine = clamped_cosine(self.permutation().bands, to_object * normal);
+                    let cosine = clamped_cosine(self.permutation.bands, to_object * normal);
                     let share: f64 = blocked.iter().zip(&cosine).map(|(b, c)| b * c).sum();
                     let own = own_visible(&vertex, receiver, &cone, object.radius_m);
                     let share = share * cone.above_horizon(normal, input.skip) * object.opacity / PI * own;

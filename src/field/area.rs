@@ -35,17 +35,14 @@ impl Area {
     /// Fits what an object fills of its bounding sphere's disc, seen from a unit direction of its frame.
     pub fn of(filled: impl Fn(DVec3) -> f64) -> Self {
         let sample = |(direction, weight)| (direction, weight, filled(direction));
-        Self::fit(&sphere_rule(12).into_iter().map(sample).collect::<Vec<_>>())
-    }
-
-    fn fit(samples: &[(DVec3, f64, f64)]) -> Self {
+        let samples: Vec<(DVec3, f64, f64)> = sphere_rule(12).into_iter().map(sample).collect();
         let outer = |d: DVec3| DMat3::from_cols(d * d.x, d * d.y, d * d.z);
         let moment = samples.iter().fold(DMat3::ZERO, |sum, &(d, weight, area)| sum + outer(d) * (weight * area));
         let axes = principal_axes(moment);
         let mut area = Area { axes: [axes.x_axis, axes.y_axis], ..Area::default() };
         // Normal equations with the right side as a seventh column.
         let mut rows = [[0.0; TERMS + 1]; TERMS];
-        for &(d, weight, value) in samples {
+        for (d, weight, value) in samples {
             let basis = area.basis(d);
             for (row, b) in rows.iter_mut().zip(basis) {
                 row[..TERMS].iter_mut().zip(basis).for_each(|(sum, c)| *sum += weight * b * c);
@@ -112,9 +109,8 @@ mod tests {
 
     /// The area that is fitted to a shape, and how far it is off where it is fitted.
     fn fitted(of: impl Fn(DVec3) -> f64) -> (Area, f64) {
-        let samples: Vec<_> = sphere_rule(12).into_iter().map(|(d, weight)| (d, weight, of(d))).collect();
-        let area = Area::fit(&samples);
-        (area, samples.iter().map(|&(d, _, value)| (area.at(d) - value).abs()).fold(0.0, f64::max))
+        let area = Area::of(&of);
+        (area, sphere_rule(12).iter().map(|&(d, _)| (area.at(d) - of(d)).abs()).fold(0.0, f64::max))
     }
 
     /// Sphere, ellipsoid, plate, cube: as they are and turned.

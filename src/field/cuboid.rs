@@ -6,6 +6,7 @@
 //! bounding radii of the box, as those of silhouette fields ([`super::silhouette`]) are, and so is the rule of what lies
 //! between a point and a light.
 
+use super::sheet::both;
 use super::silhouette::{LEAST_PENUMBRA, NEAREST, NO_BOX, blocked_share, counts_between, through_box};
 use glam::DVec3;
 
@@ -116,11 +117,7 @@ impl Cuboid {
             (near + far - 1.0).max(0.0)
         };
         let shares = [strip(0), strip(1), strip(2)];
-        // Exact where the edges are parallel, and where they cross at right angles in the middle of the light.
-        let two = |i: usize| {
-            let [a, b] = [shares[i], shares[(i + 1) % 3]];
-            a * b + ray.cosines[i].max(0.0) * (a.min(b) - a * b)
-        };
+        let two = |i: usize| both(shares[i], shares[(i + 1) % 3], ray.cosines[i].max(0.0));
         let (_, away) = ray.nearest();
         let [enters, mut leaves] = ray.in_box;
         // A ray that enters the box before the light is blocked there, wherever it would leave it.

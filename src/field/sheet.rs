@@ -190,7 +190,7 @@ impl SheetShadow {
 /// Share of a disc that lies on the inner side of two edges, from the shares inside of each: exact where the edges are
 /// parallel, in the same sense (cosine 1 of their normals) or opposite senses (-1), and where they cross at right angles
 /// in its middle.
-fn both(a: f64, b: f64, cosine: f64) -> f64 {
+pub(super) fn both(a: f64, b: f64, cosine: f64) -> f64 {
     let end = if cosine < 0.0 { (a + b - 1.0).max(0.0) } else { a.min(b) };
     a * b + cosine.abs() * (end - a * b)
 }

@@ -217,12 +217,8 @@ impl Capture {
                 let (forward, right, down) = face_axes(*face);
                 let px = self.face_px;
                 drawing.area([slot % self.columns * px, slot / self.columns * px, px, px]);
-                drawing.push(&Push {
-                    eye: eye.extend(NEAR).to_array(),
-                    right: right.extend(0.0).to_array(),
-                    down: down.extend(0.0).to_array(),
-                    forward: forward.extend(0.0).to_array(),
-                });
+                let [right, down, forward] = [right, down, forward].map(|axis| axis.extend(0.0).to_array());
+                drawing.push(&Push { eye: eye.extend(NEAR).to_array(), right, down, forward });
                 for range in ranges {
                     drawing.indexed(range.clone());
                 }

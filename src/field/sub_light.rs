@@ -395,6 +395,7 @@ pub fn blocks(fine: f64, pattern: &Pattern) -> Vec<Block> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::f64::consts::TAU;
 
     #[test]
     fn parts_lie_on_the_disc_around_its_middle() {
@@ -492,14 +493,10 @@ mod tests {
                     sum += facing * area / to.length_squared().powi(2);
                 };
                 for (i, j) in (0..400).flat_map(|i| (0..64).map(move |j| (i, j))) {
-                    let (sin, cos) = (std::f64::consts::TAU * f64::from(j) / 64.0).sin_cos();
+                    let (sin, cos) = (TAU * f64::from(j) / 64.0).sin_cos();
                     let outward = DVec3::new(cos, sin, 0.0);
                     let along = (f64::from(i) + 0.5) / 400.0;
-                    add(
-                        radius * outward + (along - 0.5) * DVec3::Z,
-                        outward,
-                        std::f64::consts::TAU * radius / 25_600.0,
-                    );
+                    add(radius * outward + (along - 0.5) * DVec3::Z, outward, TAU * radius / 25_600.0);
                     for end in [DVec3::Z, DVec3::NEG_Z] {
                         let area = PI * radius * radius * 2.0 * along / 25_600.0;
                         add(radius * along * outward + 0.5 * end, end, area);

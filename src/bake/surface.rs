@@ -218,13 +218,12 @@ mod tests {
         let mut inside = 0;
         for _ in 0..500 {
             let p = DVec3::from_array([(); 3].map(|()| 2.4 * (rng.f64() - 0.5)));
-            let distance = corners.iter().map(|t| nearest_on_triangle(t.map(|c| c - p)).length());
-            let distance = distance.fold(f64::INFINITY, f64::min);
+            let moved: Vec<[DVec3; 3]> = corners.iter().map(|t| t.map(|c| c - p)).collect();
+            let distance = moved.iter().map(|t| nearest_on_triangle(*t).length()).fold(f64::INFINITY, f64::min);
             assert!((surface.nearest(p).unwrap().distance(p) - distance).abs() < 1e-12, "{p}");
-            let exact = corners.iter().map(|t| solid_angle(t.map(|c| c - p))).sum::<f64>() / (4.0 * PI);
+            let exact = moved.iter().map(|t| solid_angle(*t)).sum::<f64>() / (4.0 * PI);
             assert!((surface.winding_number(p) - exact).abs() < 0.02, "{p}: {exact}");
             inside += usize::from(exact > 0.5);
-            let moved: Vec<[DVec3; 3]> = corners.iter().map(|t| t.map(|c| c - p)).collect();
             let depth = depth_at_origin(&moved);
             assert_eq!(depth.is_some(), exact > 0.5, "{p}");
             assert!(depth.is_none_or(|depth| (depth - distance).abs() < 1e-12), "{p}");

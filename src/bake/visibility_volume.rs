@@ -97,11 +97,9 @@ impl GroupPlan {
         let mean = |of: &dyn Fn(&Node) -> f64| free.iter().map(|node| of(node)).sum::<f64>() / free.len().max(1) as f64;
         let report =
             |samples: usize| BakeReport { samples: samples as u32, total: started.elapsed(), ..Default::default() };
+        let volume = |blocked, depths| VisibilityVolume { nodes: plan.nodes, stride, blocked, depths };
         if mean(&|node| node.crowd as f64) < CROWD && mean(&|node| node.enclosed) < ENCLOSED {
-            return (
-                VisibilityVolume { nodes: plan.nodes, stride, blocked: Vec::new(), depths: Vec::new() },
-                report(probed.len()),
-            );
+            return (volume(Vec::new(), Vec::new()), report(probed.len()));
         }
         let mut nodes: Vec<Node> = Vec::with_capacity(count);
         let row = plan.nodes.counts.x * plan.nodes.counts.y;
@@ -112,7 +110,7 @@ impl GroupPlan {
         fill(&mut nodes, plan.nodes.counts);
         let depths = nodes.iter().flat_map(|node| node.depths.iter().copied()).collect();
         let blocked = nodes.into_iter().flat_map(|node| node.blocked).collect();
-        (VisibilityVolume { nodes: plan.nodes, stride, blocked, depths }, report(count))
+        (volume(blocked, depths), report(count))
     }
 }
 

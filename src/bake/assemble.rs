@@ -48,16 +48,15 @@ impl Sources {
         if inside.iter().all(|&i| i) {
             return Err(Error::Input("every sample point lies inside the solid: nothing can see the object".into()));
         }
-        let fitted: Vec<BTreeMap<u32, f64>> = (0..unseen.len() as u32)
-            .map(|sample| {
-                if unseen[sample as usize] {
-                    let around = nearest_usable(lattice, unseen, sample);
-                    let share = 1.0 / around.len() as f64;
-                    return around.into_iter().map(|other| (other, share)).collect();
-                }
-                fit(lattice, inside, sample)
-            })
-            .collect();
+        let fitted = |sample: u32| {
+            if !unseen[sample as usize] {
+                return fit(lattice, inside, sample);
+            }
+            let around = nearest_usable(lattice, unseen, sample);
+            let share = 1.0 / around.len() as f64;
+            around.into_iter().map(|other| (other, share)).collect()
+        };
+        let fitted: Vec<BTreeMap<u32, f64>> = (0..unseen.len() as u32).map(fitted).collect();
         let directions = lattice.direction_count();
         let planes = lattice.sources();
         let mut offsets = vec![0];
@@ -114,8 +113,8 @@ fn opposite(lattice: &Lattice, sample: u32) -> Vec<[u32; 2]> {
 }
 
 /// The usable samples at the least number of steps, by breadth-first search.
-fn nearest_usable(lattice: &Lattice, inside: &[bool], start: u32) -> Vec<u32> {
-    let mut seen = vec![false; inside.len()];
+fn nearest_usable(lattice: &Lattice, unseen: &[bool], start: u32) -> Vec<u32> {
+    let mut seen = vec![false; unseen.len()];
     seen[start as usize] = true;
     let mut ring = vec![start];
     loop {
@@ -125,7 +124,7 @@ fn nearest_usable(lattice: &Lattice, inside: &[bool], start: u32) -> Vec<u32> {
                 next.push(neighbour);
             }
         }
-        let usable: Vec<u32> = next.iter().copied().filter(|&s| !inside[s as usize]).collect();
+        let usable: Vec<u32> = next.iter().copied().filter(|&s| !unseen[s as usize]).collect();
         if !usable.is_empty() {
             return usable;
         }
@@ -190,13 +189,9 @@ impl Assemble {
 /// The CPU twin of the pass, before values are rounded to the storage format.
 pub fn twin(captured: &[f32], sources: &Sources, sample_stride: usize, factor: f32) -> Vec<f64> {
     let lists = sources.offsets.windows(2).map(|w| &sources.list[w[0] as usize..w[1] as usize]);
-    lists
-        .flat_map(|list| {
-            (0..sample_stride).map(move |k| {
-                let part =
-                    |s: &Source| f64::from(s.weight) * f64::from(captured[s.sample as usize * sample_stride + k]);
-                list.iter().map(part).sum::<f64>() * f64::from(factor)
-            })
-        })
-        .collect()
+    let number = |(list, k): (&[Source], usize)| {
+        let part = |s: &Source| f64::from(s.weight) * f64::from(captured[s.sample as usize * sample_stride + k]);
+        list.iter().map(part).sum::<f64>() * f64::from(factor)
+    };
+    lists.flat_map(|list| (0..sample_stride).map(move |k| (list, k))).map(number).collect()
 }

@@ -389,10 +389,8 @@ impl Caster<'_> {
             let locals: Vec<Vec3A> = AIMED.iter().map(ray).filter(|local| local.z > 0.0).collect();
             let solid_angle = TAU * height / (AIMED_SIDE * AIMED_SIDE) as f64;
             let hits = self.cast(&locals);
-            let met = locals
-                .iter()
-                .zip(&hits)
-                .filter_map(|(local, hit)| self.front(*local, solid_angle * f64::from(local.z), hit));
+            let rays = locals.iter().zip(&hits);
+            let met = rays.filter_map(|(local, hit)| self.front(*local, solid_angle * f64::from(local.z), hit));
             // What lies in two of them is met by the rays of the first.
             let is_met = |front: &Front| aimed[..number].iter().any(|(_, other)| other.has(front.place));
             fronts.extend(met.filter(|front| target.has(front.place) && !is_met(front)));

@@ -98,14 +98,11 @@ impl Project {
 /// For every texel of a face its direction along right, down and forward, and its solid angle.
 fn texel_table(face_px: usize) -> Vec<[f32; 4]> {
     let weights = solid_angle(face_px);
-    (0..face_px * face_px)
-        .map(|i| {
-            let s = texel_st(i % face_px, face_px);
-            let t = texel_st(i / face_px, face_px);
-            let d = DVec3::new(s, t, 1.0).normalize();
-            [d.x as f32, d.y as f32, d.z as f32, weights[i] as f32]
-        })
-        .collect()
+    let texel = |i: usize| {
+        let toward = DVec3::new(texel_st(i % face_px, face_px), texel_st(i / face_px, face_px), 1.0);
+        toward.normalize().extend(weights[i]).as_vec4().to_array()
+    };
+    (0..face_px * face_px).map(texel).collect()
 }
 
 /// The CPU twin of the pass. `texel(face, x, y)` is what was captured, by channel. The result holds the coefficients of

@@ -437,25 +437,19 @@ impl GroupPlan {
             }
         }
         let spaces: Vec<GroupSpace<'_>> = (0..self.members.len()).map(|member| group.space(member)).collect();
-        let nudges: Vec<Vec<Vec3>> = spaces
-            .par_iter()
-            .zip(&surfaces)
-            .map(|(space, surface)| {
-                space.nudges(&surface.mesh.positions, &surface.mesh.normals, &surface.mesh.triangles)
-            })
-            .collect();
+        let of_surface = |(space, BakedSurface { mesh, .. }): (&GroupSpace<'_>, &BakedSurface)| {
+            space.nudges(&mesh.positions, &mesh.normals, &mesh.triangles)
+        };
+        let nudges: Vec<Vec<Vec3>> = spaces.par_iter().zip(&surfaces).map(of_surface).collect();
         let is_mixed_run = |member: usize, vertices: &[u32]| {
             let mesh = &surfaces[member].mesh;
             is_mixed(mesh, vertices) || spaces[member].divides(mesh, &nudges[member], vertices)
         };
-        let lit: Vec<Lit> = (0..self.members.len())
-            .into_par_iter()
-            .map(|member| {
-                let surface = &surfaces[member].mesh;
-                let is_mixed = |run: &[u32]| is_mixed_run(member, run);
-                Lit::new(&self.members[member].mesh, surface, parents[member].as_deref(), &is_mixed)
-            })
-            .collect();
+        let lit = |member: usize| {
+            let is_mixed = |run: &[u32]| is_mixed_run(member, run);
+            Lit::new(&self.members[member].mesh, &surfaces[member].mesh, parents[member].as_deref(), &is_mixed)
+        };
+        let lit: Vec<Lit> = (0..self.members.len()).into_par_iter().map(lit).collect();
         let mut runs = Runs::new(lit.iter().map(|lit| &lit.order.runs[..]));
         let is_mixed = |(member, first, count): (usize, usize, usize)| {
             is_mixed_run(member, &lit[member].order.vertices[first..first + count])
@@ -466,10 +460,8 @@ impl GroupPlan {
         let mut done = 0;
         for &member in &receivers {
             let mesh = surfaces[member].mesh.clone();
-            let tell = |vertices: usize| {
-                progress((total + done + vertices) as u32 / 2, total.max(1) as u32);
-            };
-            surfaces[member] = spaces[member].surface(mesh, &nudges[member], self.wanted, (&lit, &runs), &tell);
+            let tell = |vertices: usize| progress((total + done + vertices) as u32 / 2, total.max(1) as u32);
+            surfaces[member] = spaces[member].surface(mesh, &nudges[member], (&lit, &runs), &tell);
             done += surfaces[member].mesh.positions.len();
         }
         let report = BakeReport { samples: total as u32, total: started.elapsed(), ..Default::default() };
@@ -875,7 +867,6 @@ impl GroupSpace<'_> {
         &self,
         mesh: Arc<Mesh>,
         nudges: &[Vec3],
-        wanted: Wanted,
         (lit, runs): (&[Lit], &Runs),
         told: &dyn Fn(usize),
     ) -> BakedSurface {
@@ -888,9 +879,9 @@ impl GroupSpace<'_> {
         let mut transfer = vec![0.0; mesh.positions.len() * stride];
         // Pixels of a grid read no maps: all members cast their own shadows there, whose edges are crisp. One with maps is
         // drawn by its triangles.
-        let members_around = if wanted.self_visibility { self.around(&mesh, nudges) } else { Vec::new() };
+        let members_around = if plan.wanted.self_visibility { self.around(&mesh, nudges) } else { Vec::new() };
         let is_grid = || Grid::find(&mesh).is_some();
-        let has_maps = wanted.self_visibility && (members_around.contains(&true) || !is_grid());
+        let has_maps = plan.wanted.self_visibility && (members_around.contains(&true) || !is_grid());
         let mut maps = vec![0; if has_maps { mesh.positions.len() * BYTES } else { 0 }];
         let mut near = Vec::with_capacity(order.len().div_ceil(CLUSTER_VERTICES as usize));
         let mut suns = vec![[0; 2]; mesh.positions.len()];
@@ -1013,7 +1004,7 @@ impl GroupSpace<'_> {
         let told_suns = self.told_suns(&mesh, nudges, &suns).map(Arc::new);
         BakedSurface {
             mesh,
-            transfer: (any_blocked && wanted.transfer).then(|| Arc::new(transfer)),
+            transfer: (any_blocked && plan.wanted.transfer).then(|| Arc::new(transfer)),
             sky: (any_blocked && plan.views_sky).then(|| Arc::new(sky)),
             self_visibility: (any_blocked && any_in_map && has_maps).then(|| Arc::new(maps)),
             near,
@@ -1083,15 +1074,13 @@ impl Lit {
         (0..surface.triangles.len()).for_each(|part| counts[parent(part)] += 1);
         // Nine cells a part, half of them within the triangle: each corner is nearest to a third of the part.
         let mut end = 0;
-        let grids: Vec<(u32, u32)> = counts
-            .iter()
-            .map(|&count| {
-                let side = (3.0 * f64::from(count).sqrt()).ceil() as u32;
-                let first = end;
-                end += side * side;
-                (first, side)
-            })
-            .collect();
+        let grid = |&count: &u32| {
+            let side = (3.0 * f64::from(count).sqrt()).ceil() as u32;
+            let first = end;
+            end += side * side;
+            (first, side)
+        };
+        let grids: Vec<(u32, u32)> = counts.iter().map(grid).collect();
         let mut cells = vec![u32::MAX; end as usize];
         for (part, vertices) in surface.triangles.iter().enumerate() {
             let of = mesh.triangles[parent(part)].map(|v| Vec3A::from(mesh.positions[v as usize]));

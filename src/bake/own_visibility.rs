@@ -231,11 +231,6 @@ pub struct Eye {
     pub normal: Vec3,
     /// Distance below which a hit counts as near, in the blockers' frame.
     pub near: f32,
-}
-
-/// How a receiver stands among its blockers.
-#[derive(Clone, Copy)]
-pub struct Standing {
     /// Rotation from the object's frame to the blockers'.
     pub rotation: DMat3,
     /// The receiver's bounding radius in the blockers' frame.
@@ -423,12 +418,12 @@ fn locals<'r>(rays: impl IntoIterator<Item = &'r PatternRay>) -> Vec<Vec3A> {
     rays.into_iter().map(|ray| ray.local).collect()
 }
 
-pub fn see(blockers: &Blockers, standing: &Standing, eye: &Eye, bands: usize, rays: Rays, counts: Counts<'_>) -> Seen {
+pub fn see(blockers: &Blockers, eye: &Eye, bands: usize, rays: Rays, counts: Counts<'_>) -> Seen {
     let to_object = frame(eye.normal.as_dvec3());
     let caster = Caster {
         blockers,
         origin: Vec3A::from(eye.origin),
-        to_blockers: Mat3A::from((standing.rotation * to_object).as_mat3()),
+        to_blockers: Mat3A::from((eye.rotation * to_object).as_mat3()),
         counts,
     };
     let mut seen = Seen {
@@ -468,7 +463,7 @@ pub fn see(blockers: &Blockers, standing: &Standing, eye: &Eye, bands: usize, ra
             caster.aim(&mut fronts);
             seen.fronts = fronts;
             if counts.in_map.is_some() {
-                seen.map = found.map(&caster, standing);
+                seen.map = found.map(&caster, eye.radius);
             }
         }
     }
@@ -597,7 +592,7 @@ impl CellHits {
         edges
     }
 
-    fn map(&self, caster: &Caster<'_>, standing: &Standing) -> Vec<u8> {
+    fn map(&self, caster: &Caster<'_>, radius: f64) -> Vec<u8> {
         let mut map = vec![u8::MAX; BYTES];
         if self.distances.iter().all(|distance| distance.is_infinite()) {
             map[..NODES].fill(encode_angle(LIMIT_RAD));
@@ -614,7 +609,7 @@ impl CellHits {
             let free = here[node].is_infinite();
             map[node] = encode_angle(if free { angle } else { -angle });
             let (way, away) = if free { edge.unwrap_or((toward, f32::INFINITY)) } else { (toward, here[node]) };
-            map[NODES + node] = encode_distance(f64::from(away) * octahedral(way.as_dvec3()) / standing.radius);
+            map[NODES + node] = encode_distance(f64::from(away) * octahedral(way.as_dvec3()) / radius);
         }
         map
     }
@@ -673,10 +668,9 @@ mod tests {
 
     /// What a place sees that looks up; `in_map` are members that its map has.
     fn see_up(blockers: &Blockers, origin: Vec3, in_map: Option<&[u32]>) -> Seen {
-        let eye = Eye { origin, normal: Vec3::Y, near: 0.0 };
+        let eye = Eye { origin, normal: Vec3::Y, near: 0.0, rotation: DMat3::IDENTITY, radius: 1.0 };
         let counts = Counts { blocks: &[true; 8], in_map, sky: false, targets: &[], screens: &[] };
-        let standing = Standing { rotation: DMat3::IDENTITY, radius: 1.0 };
-        see(blockers, &standing, &eye, 4, Rays::Many, counts)
+        see(blockers, &eye, 4, Rays::Many, counts)
     }
 
     /// A receiver at the origin that looks up at a ball of radius 1 whose centre lies `toward`.

@@ -3,7 +3,7 @@
 
 use super::cluster_order::{ClusterOrder, cluster_order};
 use super::links::{Link, Met, Runs, links, side};
-use super::own_visibility::{Counts, Eye, Front, PATTERN, Rays, Seen, Standing, Target, directions, see};
+use super::own_visibility::{Counts, Eye, Front, PATTERN, Rays, Seen, Target, directions, see};
 use super::packet::{BlockerHit, BlockerTriangle, Blockers, Mask};
 use super::refine::{FLAT, Limits, ON_TRIANGLE, Refined, refine, sides, vertex_count};
 use super::triangles::{distinct, weights};
@@ -657,10 +657,13 @@ impl GroupSpace<'_> {
 
     fn see_with(&self, Place { position, normal, nudge, edge }: Place, rays: Rays, in_map: Option<&[u32]>) -> Seen {
         let group = self.group;
-        let near = NEAR * edge * self.scale();
-        let eye = Eye { origin: self.placed(position + nudge).into(), normal, near };
-        let rotation = DMat3::from_quat(self.own().placement.turn());
-        let standing = Standing { rotation, radius: group.spheres[self.member].1 };
+        let eye = Eye {
+            origin: self.placed(position + nudge).into(),
+            normal,
+            near: NEAR * edge * self.scale(),
+            rotation: DMat3::from_quat(self.own().placement.turn()),
+            radius: group.spheres[self.member].1,
+        };
         let counts = Counts {
             blocks: &self.blocks,
             in_map,
@@ -668,7 +671,7 @@ impl GroupSpace<'_> {
             targets: &group.targets,
             screens: &group.screens,
         };
-        let mut seen = see(&group.blockers, &standing, &eye, group.plan.bands, rays, counts);
+        let mut seen = see(&group.blockers, &eye, group.plan.bands, rays, counts);
         seen.from = position + nudge;
         let is_covered = self.is_covered(position, normal, nudge);
         if is_covered {

@@ -113,14 +113,6 @@ impl Pattern {
             rays,
         }
     }
-
-    /// Whether the rays of the cells beside a cell are of different states. The cell's own ray has no say: where rays that
-    /// miss a railing kept their cells whole and rays that meet it had them cut, the railing would block too little.
-    fn is_at_edge(&self, cell: usize, is_free: impl Fn(usize) -> bool) -> bool {
-        let mut beside = self.cells[cell].neighbours.iter().flatten().map(|&other| is_free(other));
-        let first = beside.next();
-        beside.any(|free| Some(free) != first)
-    }
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -516,7 +508,13 @@ impl CellHits {
             let mut beside = pattern.cells[cell].neighbours.iter().flatten();
             with_map && beside.any(|&other| is_free(other) != is_free(cell))
         };
-        let at_edge = |cell: &usize| pattern.is_at_edge(*cell, |i| hits[i].is_none());
+        // The cell's own ray has no say: where rays that miss a railing kept their cells whole and rays that meet it had
+        // them cut, the railing would block too little.
+        let at_edge = |cell: &usize| {
+            let mut beside = pattern.cells[*cell].neighbours.iter().flatten().map(|&other| hits[other].is_none());
+            let first = beside.next();
+            beside.any(|free| Some(free) != first)
+        };
         let (at_edges, others): (Vec<usize>, Vec<usize>) = (0..PATTERN).partition(at_edge);
         let only_in_map: Vec<usize> = others.into_iter().filter(|&cell| at_map_edge(cell)).collect();
         let cuts = |cells: &[usize]| locals(cells.iter().flat_map(|&cell| &pattern.cells[cell].cuts));

@@ -65,6 +65,7 @@ pub(super) fn tell_repeated(mesh: &Mesh) {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::asset::generate;
 
     #[test]
     fn meshes_of_one_shape_differ_in_place_and_size() {
@@ -77,7 +78,6 @@ mod tests {
         assert!(!have_one_shape(&torus, &moved(|p| p * Vec3::new(1.0, 1.01, 1.0))));
         assert!(!have_one_shape(&torus, &generate::torus(1.0, 0.3, 12, 24)));
     }
-    use crate::asset::generate;
 
     #[test]
     fn repeated_triangles_count_once_and_backs_stay() {

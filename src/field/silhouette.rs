@@ -331,7 +331,9 @@ impl SilhouetteField {
     /// Share of the disc of a light with this outline that its parts cover, from the direction of its centre and its angular
     /// radius' sine.
     pub fn covered(&self, toward: DVec3, sine: f64) -> f64 {
-        let light = SeenLight::new(toward / sine, 1.0).in_quarters();
+        let mut light = SeenLight::new(toward / sine, 1.0);
+        // Four blocks, however small it is.
+        light.fine = 1.0;
         let mut covered = 0.0;
         let mut whole = 0.0;
         for (middle, parts) in light.blocks() {

@@ -202,11 +202,6 @@ impl SeenLight {
         SeenLight { fine: fine_share(seen.sine, LIMIT_OUTLINE), ..seen }
     }
 
-    /// The light as four blocks, however small it is.
-    pub fn in_quarters(self) -> Self {
-        SeenLight { fine: 1.0, ..self }
-    }
-
     /// The same with a box around it, turned by `rotation`: a flat body lies behind most of its bounding sphere.
     pub fn boxed(self, corners: [DVec3; 2], rotation: DQuat) -> Self {
         SeenLight { boxed: Some((corners, rotation)), ..self }

@@ -75,15 +75,6 @@ impl SkyViews {
         self.counts.push(cells.len() as u8);
         self.cells.extend_from_slice(cells);
     }
-
-    fn each(&self) -> impl Iterator<Item = &[[u8; 2]]> {
-        let mut rest = &self.cells[..];
-        self.counts.iter().map(move |&count| {
-            let (of_vertex, after) = rest.split_at(usize::from(count));
-            rest = after;
-            of_vertex
-        })
-    }
 }
 
 /// A sky to which transfer vectors are fitted.
@@ -128,7 +119,10 @@ impl SkyFit {
         let gray = GRAY / 3.0 * (squares.x_axis.x + squares.y_axis.y + squares.z_axis.z);
         squares += DMat3::from_diagonal(DVec3::splat(gray.max(LEAST_SQUARE)));
         let least = squares.inverse();
-        for (view, transfer) in views.each().zip(transfers.chunks_exact_mut(stride)) {
+        let mut unread = &views.cells[..];
+        for (&count, transfer) in views.counts.iter().zip(transfers.chunks_exact_mut(stride)) {
+            let (view, after) = unread.split_at(usize::from(count));
+            unread = after;
             let of_cell = |[cell, root]: &[u8; 2]| unpack(*root) * self.cells[usize::from(*cell)];
             let light = PI * view.iter().map(of_cell).sum::<DVec3>();
             let met = transfer.iter().zip(blurred).map(|(t, sky)| f64::from(*t) * *sky).sum::<DVec3>();

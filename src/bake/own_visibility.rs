@@ -664,7 +664,7 @@ mod tests {
         Blockers::new(triangles.map(triangle), Vec::new(), Vec::new())
     }
 
-    /// What a place sees that looks up; `in_map` are members that its map has.
+    /// The view from a place upwards; `in_map` are members that its map has.
     fn see_up(blockers: &Blockers, origin: Vec3, in_map: Option<&[u32]>) -> Seen {
         let eye = Eye { origin, normal: Vec3::Y, near: 0.0, rotation: DMat3::IDENTITY, radius: 1.0 };
         let counts = Counts { blocks: &[true; 8], in_map, sky: false, targets: &[], screens: &[] };

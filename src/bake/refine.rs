@@ -50,7 +50,7 @@ const GROWTH: f64 = 0.35;
 
 /// A surface in the making. Vertices are only ever added.
 pub(super) struct Refined<'g> {
-    /// That its points are seen in.
+    /// The space in which its points are seen.
     space: GroupSpace<'g>,
     is_flat: bool,
     pub positions: Vec<Vec3>,

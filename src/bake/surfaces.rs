@@ -1187,7 +1187,7 @@ pub(super) struct StoredGroup {
     surfaces: Vec<StoredSurface>,
 }
 
-/// What is left of a payload.
+/// The unread rest of a payload.
 struct Rest<'p>(&'p [u8]);
 
 impl Rest<'_> {
@@ -1197,12 +1197,12 @@ impl Rest<'_> {
         Some(bytemuck::pod_collect_to_vec(taken))
     }
 
-    /// What is there or not; `None` where it is missing.
+    /// An optional part; `None` where its bytes are missing.
     fn take_if<T: bytemuck::Pod>(&mut self, is_there: bool, count: usize) -> Option<Option<Vec<T>>> {
         if is_there { self.take(count).map(Some) } else { Some(None) }
     }
 
-    /// How many things each vertex has, and all of these, where there are so many.
+    /// For each vertex how many things it has, and all of these things, if their number is given.
     fn take_counted<T: bytemuck::Pod>(
         &mut self,
         vertices: usize,
@@ -1216,7 +1216,7 @@ impl Rest<'_> {
     }
 }
 
-/// The bytes of what may be there.
+/// The bytes of an optional part.
 fn bytes<T: bytemuck::Pod>(of: Option<&Vec<T>>) -> &[u8] {
     of.map(|of| bytemuck::cast_slice(of)).unwrap_or_default()
 }

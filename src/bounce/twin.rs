@@ -484,7 +484,7 @@ fn own_visible(vertex: &TwinVertex<'_>, receiver: &MergeObject<'_>, cone: &Cone,
     (seen / open.max(0.05)).clamp(0.0, 1.0)
 }
 
-/// What a mover blocks as seen from a place in its frame, in r, and against the middle of those directions.
+/// The blocked part of a mover from a place in its frame, in r, and the direction against its middle.
 fn blocked_from(object: &MergeObject<'_>, from: DVec3) -> ([f64; MAX_COEFFICIENTS], DVec3) {
     let field = object.blocked.expect("what reflects has an occlusion field");
     let mut blocked = [0.0; MAX_COEFFICIENTS];

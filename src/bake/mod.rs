@@ -201,7 +201,7 @@ impl Baker {
         let samples = samples?;
         let device = &self.device;
         let capture = Capture::new(device, &self.library, model?, header.face_px, header.kind, Way::usual(device))?;
-        let project = Project::new(device, &self.library, header.bands, header.kind, header.face_px, capture.columns)?;
+        let project = Project::new(device, &self.library, header.bands, &capture)?;
         let most = capture.capacity() as usize;
         let stride = header.sample_stride();
         let bytes = |count: usize| 4 * (count * stride) as u64;

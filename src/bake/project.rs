@@ -4,7 +4,7 @@
 //! sample `channels` x `channel_stride(bands)` floats. They hold the blocked part (1 where a texel is below 1) or the
 //! radiance.
 
-use super::capture::Slots;
+use super::capture::{Capture, Slots};
 use crate::error::{Error, Result};
 use crate::field::quantity::{FieldKind, channel_stride};
 use crate::gpu::memory::TexelView;
@@ -49,8 +49,7 @@ pub struct Project {
     texels: Buffer,
     pub bands: usize,
     pub kind: FieldKind,
-    face_px: u32,
-    columns: u32,
+    push: Push,
 }
 
 impl Project {
@@ -60,14 +59,8 @@ impl Project {
             .define("WORKGROUP", workgroup(bands, kind))
     }
 
-    pub fn new(
-        device: &Arc<Device>,
-        library: &Library,
-        bands: usize,
-        kind: FieldKind,
-        face_px: u32,
-        columns: u32,
-    ) -> Result<Self> {
+    pub fn new(device: &Arc<Device>, library: &Library, bands: usize, capture: &Capture) -> Result<Self> {
+        let Capture { kind, face_px, columns, .. } = *capture;
         let shader = library.shader(&Self::row(bands, kind))?;
         let pipeline = ComputePipeline::new(device, "project", &shader)?;
         let texels = Buffer::with_data(device, "project texels", &texel_table(face_px as usize))?;
@@ -77,7 +70,7 @@ impl Project {
                 "cube faces of {face_px} px have more texels than the device's views hold ({most})"
             )));
         }
-        Ok(Project { pipeline, texels, bands, kind, face_px, columns })
+        Ok(Project { pipeline, texels, bands, kind, push: Push { face_px, atlas_columns: columns } })
     }
 
     pub fn record<'r>(
@@ -88,10 +81,9 @@ impl Project {
         coefficients: &'r Buffer,
         sample_count: u32,
     ) -> Result<()> {
-        let push = Push { face_px: self.face_px, atlas_columns: self.columns };
         let texels = TexelView::new(&self.texels, QUAD_FORMAT)?;
         let resources = [Bind::Image(atlas), Bind::Buffer(samples), Bind::Texel(texels), Bind::Buffer(coefficients)];
-        commands.dispatch(&self.pipeline, &resources, &push, [sample_count * self.pipeline.local_size[0], 1, 1])
+        commands.dispatch(&self.pipeline, &resources, &self.push, [sample_count * self.pipeline.local_size[0], 1, 1])
     }
 }
 

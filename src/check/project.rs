@@ -71,8 +71,8 @@ impl<'b> Content<'b> {
 /// The largest error relative to 1 + what is wanted, and the largest magnitude of what is wanted. Infinite where a
 /// second run differs.
 fn compare(content: &Content<'_>, bands: usize) -> Result<(f64, f64)> {
-    let Capture { kind, face_px, columns, .. } = content.capture;
-    let project = Project::new(content.baker.device(), content.baker.library(), bands, kind, face_px, columns)?;
+    let Capture { kind, face_px, .. } = content.capture;
+    let project = Project::new(content.baker.device(), content.baker.library(), bands, &content.capture)?;
     // Samples have different scales.
     let sample = |(eye, &slots): (usize, &Slots)| SampleFaces { slots, scale: [1.0, 0.37, 2.5][eye % 3] };
     let samples: Vec<SampleFaces> = content.batch.iter().enumerate().map(sample).collect();

@@ -3,7 +3,7 @@
 //! All animations of a file run at the same time, and each starts anew when its last key is reached.
 
 use ::gltf::json::accessor::ComponentType;
-use ::gltf::json::animation::{Interpolation, Property};
+use ::gltf::json::animation::{Channel as ChannelJson, Interpolation, Property, Sampler};
 use ::gltf::json::validation::Checked;
 use glam::Vec3;
 
@@ -51,7 +51,7 @@ pub fn tracks(document: &Document, notes: &mut Notes) -> Result<Vec<Option<Track
                 notes.leave_out("animations whose times or rotations are all zeros, which are no times or rotations");
                 continue;
             }
-            let read = read(document, index, at)?;
+            let read = read(document, format!("animations[{index}].channels[{at}]"), channel, sampler)?;
             channels.push((channel.target.node.value(), property, read));
         }
         // All channels of an animation start anew together.
@@ -59,21 +59,18 @@ pub fn tracks(document: &Document, notes: &mut Notes) -> Result<Vec<Option<Track
         for (node, property, mut channel) in channels {
             channel.period_s = (last > 1e-6).then_some(last);
             let tracks = out[node].get_or_insert_default();
-            let taken = match property {
-                Property::Translation => tracks.position.is_some(),
-                Property::Rotation => tracks.rotation.is_some(),
-                Property::MorphTargetWeights => !tracks.weights.is_empty(),
-                _ => tracks.scale.is_some(),
-            };
-            if taken {
-                notes.leave_out("channels of animations that move what an earlier one moves");
-                continue;
-            }
             match property {
-                Property::Translation => tracks.position = Some(channel.keys(document, |n| Vec3::from_slice(n))?),
-                Property::Rotation => tracks.rotation = Some(channel.keys(document, |n| [n[0], n[1], n[2], n[3]])?),
-                Property::MorphTargetWeights => tracks.weights = channel.weights(document)?,
-                _ => tracks.scale = Some(channel.scales(document, notes)?),
+                Property::Translation if tracks.position.is_none() => {
+                    tracks.position = Some(channel.keys(document, |n| Vec3::from_slice(n))?);
+                }
+                Property::Rotation if tracks.rotation.is_none() => {
+                    tracks.rotation = Some(channel.keys(document, |n| [n[0], n[1], n[2], n[3]])?);
+                }
+                Property::MorphTargetWeights if tracks.weights.is_empty() => {
+                    tracks.weights = channel.weights(document)?
+                }
+                Property::Scale if tracks.scale.is_none() => tracks.scale = Some(channel.scales(document, notes)?),
+                _ => notes.leave_out("channels of animations that move what an earlier one moves"),
             }
         }
     }
@@ -88,11 +85,7 @@ fn target_count(document: &Document, node: usize) -> usize {
 }
 
 /// Reads the numbers of a channel.
-fn read(document: &Document, animation: usize, at: usize) -> Result<Channel> {
-    let json = &document.root.animations[animation];
-    let channel = &json.channels[at];
-    let place = format!("animations[{animation}].channels[{at}]");
-    let sampler = &json.samplers[channel.sampler.value()];
+fn read(document: &Document, place: String, channel: &ChannelJson, sampler: &Sampler) -> Result<Channel> {
     let (element, width) = match channel.target.path {
         Checked::Valid(Property::Rotation) => (4, 4),
         Checked::Valid(Property::MorphTargetWeights) => (1, target_count(document, channel.target.node.value()).max(1)),

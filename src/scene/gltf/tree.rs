@@ -5,7 +5,7 @@
 //! copy of the mesh.
 
 use ::gltf::json::scene::Node as NodeJson;
-use glam::{DAffine3, DMat3, DMat4, DQuat, DVec3, Vec3};
+use glam::{DAffine3, DMat3, DMat4, DQuat, DVec3, Quat, Vec3};
 
 use super::accessor;
 use super::animation::Tracks;
@@ -174,10 +174,7 @@ fn instances(document: &Document, index: usize) -> Result<Option<Vec<DAffine3>>>
         numbers.as_ref().map_or(DVec3::splat(default), |n| Vec3::from_slice(&n[3 * i..]).as_dvec3())
     };
     let instance = |i: usize| {
-        let rotation = rotations.as_ref().map_or(DQuat::IDENTITY, |n| {
-            let [x, y, z, w] = std::array::from_fn(|k| f64::from(n[4 * i + k]));
-            DQuat::from_xyzw(x, y, z, w)
-        });
+        let rotation = rotations.as_ref().map_or(DQuat::IDENTITY, |n| Quat::from_slice(&n[4 * i..]).as_dquat());
         let position = triple(&positions, i, 0.0);
         let scale = triple(&scales, i, 1.0);
         let within = |v: DVec3| v.abs().max_element() <= f64::from(POSITION_LIMIT_M);

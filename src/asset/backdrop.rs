@@ -28,7 +28,7 @@ impl Backdrop {
             return None;
         }
         let picture = environment.picture.as_deref();
-        let [wide, high] = picture.map_or(SIZE, |picture| picture.size());
+        let [wide, high] = picture.map_or(SIZE, |picture| [picture.width, picture.height]);
         // Texels of the picture along one of the map.
         let step = wide.div_ceil(WIDEST);
         let size = [wide / step, (high / step).max(1)];
@@ -45,9 +45,10 @@ impl Backdrop {
         };
         let mut texels: Vec<Vec3> = (0..size[0] * size[1]).into_par_iter().map(texel).collect();
         let share = environment.picture_scale() / (step * step) as f32;
-        for (column, row, radiance) in picture.iter().flat_map(|picture| picture.taken_out()) {
-            let at = (row / step).min(size[1] - 1) * size[0] + (column / step).min(size[0] - 1);
-            texels[at] += share * radiance;
+        for &(index, radiance) in picture.iter().flat_map(|picture| &picture.taken) {
+            let row = (index / wide / step).min(size[1] - 1);
+            let column = (index % wide / step).min(size[0] - 1);
+            texels[row * size[0] + column] += share * Vec3::from(radiance);
         }
         Some(Backdrop { width: size[0], texels, turn: turn.inverse() })
     }

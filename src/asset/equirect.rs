@@ -3,12 +3,11 @@
 use std::f64::consts::{PI, TAU};
 use std::io::Cursor;
 
-use glam::{DMat3, DQuat, DVec3, Vec3};
+use glam::{DMat3, DQuat, DVec3};
 use image::{ImageFormat, ImageReader, Limits};
 use rayon::prelude::*;
 
 use super::disc::Disc;
-use super::peak::Sky;
 use super::picture::linear_from_srgb;
 use crate::error::{Error, Result};
 use crate::sh::basis::{self, MAX_BANDS, MAX_COEFFICIENTS};
@@ -31,15 +30,17 @@ const ROW_NODES: usize = 16;
 /// [`super::environment::EnvironmentImage`].
 #[derive(Debug)]
 pub struct Equirect {
-    width: usize,
-    height: usize,
-    texels: Vec<[f32; 3]>,
+    pub(super) width: usize,
+    pub(super) height: usize,
+    pub(super) texels: Vec<[f32; 3]>,
+    /// Of a texel of each row, steradians.
+    pub(super) solid_angles: Vec<f64>,
     /// The sun and the bright windows of the picture, which its texels and coefficients no longer hold: a spot of at
     /// most 8 degrees that sends at least a twentieth of all light, and up to three compact patches of up to 60 degrees
     /// that stand out.
     pub lights: Vec<Disc>,
     /// Of these, by texel, row by row, the radiance that was theirs.
-    taken: Vec<(usize, [f32; 3])>,
+    pub(super) taken: Vec<(usize, [f32; 3])>,
     /// Its projection to [`MAX_BANDS`] bands, one list per channel. It is exact for a radiance that is constant over each
     /// texel: texels are integrated, not sampled at their centres.
     pub coefficients: [Vec<f64>; 3],
@@ -91,28 +92,24 @@ impl Equirect {
         if texels.is_empty() || texels.iter().flatten().any(|c| !(c.is_finite() && *c >= 0.0)) {
             return Err(fail("no pixels, or a pixel that is negative or not finite".into()));
         }
+        let width = rgb.width() as usize;
+        let height = rgb.height() as usize;
+        let solid_angle = |y: usize| {
+            let [north, south] = [y, y + 1].map(|y| (y as f64 * PI / height as f64).cos());
+            (north - south) * TAU / width as f64
+        };
         let mut picture = Self {
-            width: rgb.width() as usize,
-            height: rgb.height() as usize,
+            width,
+            height,
             texels,
+            solid_angles: (0..height).map(solid_angle).collect(),
             lights: Vec::new(),
             taken: Vec::new(),
             coefficients: Default::default(),
         };
-        let size = picture.size();
-        (picture.lights, picture.taken) = Sky::new(&mut picture.texels, size).take_out_lights();
+        picture.take_out_lights();
         picture.coefficients = picture.project();
         Ok(picture)
-    }
-
-    /// Width and height, texels.
-    pub fn size(&self) -> [usize; 2] {
-        [self.width, self.height]
-    }
-
-    /// Columns, rows and radiance of texels that became lights.
-    pub fn taken_out(&self) -> impl Iterator<Item = (usize, usize, Vec3)> {
-        self.taken.iter().map(|&(index, radiance)| (index % self.width, index / self.width, radiance.into()))
     }
 
     /// The texel in `direction` (unit).

@@ -5,9 +5,9 @@
 //! The picture keeps the rest. Together they send as much light as the whole picture.
 
 use super::disc::Disc;
-use super::equirect::direction;
+use super::equirect::{Equirect, direction};
 use glam::DVec3;
-use std::f64::consts::{PI, TAU};
+use std::f64::consts::PI;
 
 /// Angular radius within which the peak lies, radians (4 degrees).
 const REACH_RAD: f64 = 4.0 * PI / 180.0;
@@ -36,27 +36,7 @@ pub(super) const WINDOW_NAME: &str = "window of the picture";
 /// Windows that are taken out at most: each is a light.
 const MOST_WINDOWS: usize = 3;
 
-/// Texels of a picture, rows from +y, and where they lie.
-pub(super) struct Sky<'t> {
-    texels: &'t mut [[f32; 3]],
-    width: usize,
-    height: usize,
-    /// Of a texel of each row, steradians.
-    solid_angles: Vec<f64>,
-    /// By texel, row by row, the radiance that was taken out.
-    taken: Vec<(usize, [f32; 3])>,
-}
-
-impl<'t> Sky<'t> {
-    pub fn new(texels: &'t mut [[f32; 3]], [width, height]: [usize; 2]) -> Self {
-        let solid_angle = |y: usize| {
-            let [north, south] = [y, y + 1].map(|y| (y as f64 * PI / height as f64).cos());
-            (north - south) * TAU / width as f64
-        };
-        let solid_angles = (0..height).map(solid_angle).collect();
-        Sky { texels, width, height, solid_angles, taken: Vec::new() }
-    }
-
+impl Equirect {
     fn solid_angle(&self, index: usize) -> f64 {
         self.solid_angles[index / self.width]
     }
@@ -115,11 +95,10 @@ impl<'t> Sky<'t> {
         Some(Disc { name, toward, half_angle_rad, radiance: taken / solid_angle })
     }
 
-    /// Takes the sun and bright windows out. Returns them, and by texel, row by row, the radiance that was theirs.
-    pub fn take_out_lights(mut self) -> (Vec<Disc>, Vec<(usize, [f32; 3])>) {
+    /// Takes the sun and bright windows out.
+    pub(super) fn take_out_lights(&mut self) {
         let sun = self.take_out_sun();
-        let lights = sun.into_iter().chain(self.take_out_windows()).collect();
-        (lights, self.taken)
+        self.lights = sun.into_iter().chain(self.take_out_windows()).collect();
     }
 
     fn take_out_windows(&mut self) -> Vec<Disc> {

@@ -67,9 +67,11 @@ impl Patches {
 }
 
 pub struct DrawnGrid {
-    positions: Buffer,
+    /// Of the parallelogram.
+    pub(super) positions: Buffer,
     places: Buffer,
-    indices: Buffer,
+    /// Of its triangles.
+    pub(super) indices: Buffer,
     pub(super) corners: Buffer,
     pub(super) cells: [u32; 2],
     /// [`Patches`]: positions, places and indices.
@@ -116,11 +118,6 @@ impl DrawnGrid {
         })
     }
 
-    /// Positions of the parallelogram and the indices of its triangles.
-    pub(super) fn parallelogram(&self) -> [&Buffer; 2] {
-        [&self.positions, &self.indices]
-    }
-
     /// Whether a device's texel views hold that many cells and that many vertices in all.
     pub fn fits(device: &Device, cells: usize, vertices: usize) -> bool {
         TexelView::fits(device, QUADS, 16 * cells as u64) && TexelView::fits(device, QUAD_FORMAT, 16 * vertices as u64)
@@ -147,12 +144,8 @@ impl DrawGrid {
         DrawGrid { maker, made: Default::default() }
     }
 
-    /// Makes what grids are drawn with.
-    pub fn make(&self, by_pixel: bool) -> Result<()> {
-        self.pipeline(by_pixel).map(|_| ())
-    }
-
-    fn pipeline(&self, by_pixel: bool) -> Result<&GraphicsPipeline> {
+    /// What grids are drawn with.
+    pub(super) fn pipeline(&self, by_pixel: bool) -> Result<&GraphicsPipeline> {
         made_once(&self.made[usize::from(by_pixel)], || {
             self.maker.make("draw grid", &Self::rows(by_pixel), self.maker.state)
         })

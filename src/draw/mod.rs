@@ -341,7 +341,7 @@ impl Draw {
         let shown = || self.make_shown(surfaces, grids);
         let (light, (mirrors, shown)) = rayon::join(light, || rayon::join(mirrors, shown));
         if sky {
-            self.sky.make()?;
+            self.sky.pipeline()?;
         }
         light.and(mirrors).and(shown)
     }
@@ -349,7 +349,7 @@ impl Draw {
     /// Those of them that show the light.
     fn make_shown(&self, surfaces: &HashSet<DrawnSurface>, grids: bool) -> Result<()> {
         let by_pixel = self.evaluates_pixels();
-        let grid = || if grids { self.grid.make(by_pixel) } else { Ok(()) };
+        let grid = || if grids { self.grid.pipeline(by_pixel).map(|_| ()) } else { Ok(()) };
         let (triangles, grid) = rayon::join(|| self.triangles.make(surfaces, by_pixel), grid);
         triangles.and(grid)
     }

@@ -74,12 +74,8 @@ impl DrawSky {
         DrawSky { maker, made: OnceLock::new() }
     }
 
-    /// Makes what skies are drawn with.
-    pub fn make(&self) -> Result<()> {
-        self.pipeline().map(|_| ())
-    }
-
-    fn pipeline(&self) -> Result<&GraphicsPipeline> {
+    /// What skies are drawn with.
+    pub fn pipeline(&self) -> Result<&GraphicsPipeline> {
         made_once(&self.made, || {
             let state = GraphicsState { keeps: Keeps::ColorOver, ..self.maker.state };
             let rows = ["show.vert", "sky.frag"].map(|file| ShaderPermutation::new(file, 4));

@@ -5,6 +5,7 @@
 //! fine as the vertices on which they fell.
 
 use crate::bake::surfaces::CrispSun;
+use crate::draw::triangles::DrawnTriangles;
 use crate::draw::{DEPTH, DrawnMesh, DrawnPaint};
 use crate::error::Result;
 use crate::gpu::{
@@ -180,20 +181,18 @@ pub(super) fn draw<'r>(
         clip_from_object: (view.clip_from_world * caster.world_from_object).as_mat4().to_cols_array(),
         alpha_cutoff,
     };
+    let (positions, indices) = match caster.mesh {
+        DrawnMesh::Grid(grid, _) => (&grid.positions, &grid.indices),
+        DrawnMesh::Triangles(mesh) => (&mesh.positions, &mesh.indices),
+    };
     match (caster.mesh, caster.paint) {
-        (DrawnMesh::Grid(grid, _), _) => {
-            let [positions, indices] = grid.parallelogram();
-            drawing.bind(plain, &[(positions, 0)], indices);
-            drawing.push(&push(0.0));
-        }
-        (DrawnMesh::Triangles(mesh), Some(paint)) if mesh.paint.is_some() => {
-            let vertices: Vec<_> = [&mesh.positions].into_iter().chain(&mesh.paint).map(|buffer| (buffer, 0)).collect();
-            drawing.bind(with_holes, &vertices, &mesh.indices);
+        (DrawnMesh::Triangles(DrawnTriangles { paint: Some(places), .. }), Some(paint)) => {
+            drawing.bind(with_holes, &[(positions, 0), (places, 0)], indices);
             drawing.resources(&[Bind::Texture(paint.texture)])?;
             drawing.push(&push(paint.alpha_cutoff));
         }
-        (DrawnMesh::Triangles(mesh), _) => {
-            drawing.bind(plain, &[(&mesh.positions, 0)], &mesh.indices);
+        _ => {
+            drawing.bind(plain, &[(positions, 0)], indices);
             drawing.push(&push(0.0));
         }
     }

@@ -27,6 +27,16 @@ pub fn through_pixels(camera: &Camera, size: [f64; 2]) -> impl Fn([f64; 2]) -> D
     }
 }
 
+/// World to clip space of a face of a cube around a place, reversed depth. Faces come along x, -x, y and so on; columns
+/// of each lie along the next axis of the world, and rows along the one after. `zoom` is half the width of a face over the
+/// tangent of the angle that it shows to each side.
+pub fn cube_face_from_world(centre: DVec3, near_m: f64, face: usize, zoom: f64) -> DMat4 {
+    let axis = |offset: usize| DVec3::AXES[(face / 2 + offset) % 3];
+    let forward = if face.is_multiple_of(2) { axis(0) } else { -axis(0) };
+    let row = |of: DVec3| of.extend(-of.dot(centre));
+    DMat4::from_cols(row(zoom * axis(1)), row(zoom * axis(2)), DVec4::W * near_m, row(forward)).transpose()
+}
+
 /// Distance of the near plane in metres.
 pub fn near_m(camera: &Camera) -> f64 {
     1e-3 * camera.eye.as_dvec3().distance(camera.target.as_dvec3())

@@ -5,13 +5,13 @@
 //! those of all that may stand before a lamp: among 797 things 470 stand on a list of a wall, of which 26 are looked up
 //! for each lamp. A map takes the same time whatever it holds.
 
-use crate::draw::DEPTH;
 use crate::draw::sun_map::{HEIGHT, MapCaster, View, draw, pipelines};
+use crate::draw::{DEPTH, camera};
 use crate::error::Result;
 use crate::gpu::{Access, Buffer, BufferKind, Commands, Device, Image, ImageShape, Target};
 use crate::layout::LampMap;
 use crate::shaders::Library;
-use glam::{DMat4, DVec3, DVec4};
+use glam::{DVec3, DVec4};
 use std::iter::repeat_n;
 use std::sync::Arc;
 
@@ -100,22 +100,14 @@ impl LampMaps {
 }
 
 impl MappedLamp {
-    /// The faces of all parts, below each other: of each axis the positive and then the negative one, whose columns lie
-    /// along the next axis and whose rows along the one after.
+    /// The faces of all parts, below each other.
     fn views(&self, side_px: u32) -> Vec<View> {
-        let face = |middle: DVec3, face: u32, number: u32| {
-            let axis = (face / 2) as usize;
-            let row = |axis: usize, sign: f64| (sign * DVec3::AXES[axis]).extend(-sign * middle[axis]);
-            let ahead = if face.is_multiple_of(2) { 1.0 } else { -1.0 };
-            let rows =
-                [row((axis + 1) % 3, 1.0), row((axis + 2) % 3, 1.0), self.nearest_m * DVec4::W, row(axis, ahead)];
-            View {
-                area: [0, number * side_px, side_px, side_px],
-                clip_from_world: DMat4::from_cols_array_2d(&rows.map(|row| row.to_array())).transpose(),
-            }
-        };
         let faces = self.middles.iter().flat_map(|&middle| (0..FACES).map(move |face| (middle, face)));
-        faces.zip(0..).map(|((middle, axis), number)| face(middle, axis, number)).collect()
+        let view = |((middle, face), number): ((DVec3, u32), u32)| View {
+            area: [0, number * side_px, side_px, side_px],
+            clip_from_world: camera::cube_face_from_world(middle, self.nearest_m, face as usize, 1.0),
+        };
+        faces.zip(0..).map(view).collect()
     }
 }
 

@@ -1,9 +1,10 @@
 //! Probes: what stands around a curved glossy surface, in six pictures from its middle.
 
 use crate::asset::mesh::Mesh;
+use crate::draw::camera;
 use crate::draw::mirror::PROBE_ZOOM;
 use crate::lists::sight::SightCamera;
-use glam::{DMat4, DVec3, DVec4};
+use glam::DVec3;
 
 /// Distance from the middle, in bounding radii, within which nothing is shown.
 const NEAREST: f64 = 0.05;
@@ -25,7 +26,7 @@ impl Probe {
     pub fn new(centre: DVec3, radius_m: f64, side: u32) -> Self {
         let near_m = NEAREST * radius_m;
         let camera = |face: usize| SightCamera {
-            clip_from_world: clip_from_world(centre, near_m, face),
+            clip_from_world: camera::cube_face_from_world(centre, near_m, face, PROBE_ZOOM),
             eye: centre,
             near_m: near_m * (1.0 + 2.0 / (PROBE_ZOOM * PROBE_ZOOM)).sqrt(),
             size: [side; 2],
@@ -33,14 +34,6 @@ impl Probe {
         };
         Probe { centre, near_m, side, cameras: std::array::from_fn(camera) }
     }
-}
-
-/// Across, down and forward of a picture are the world's axes in turn.
-fn clip_from_world(centre: DVec3, near_m: f64, face: usize) -> DMat4 {
-    let axis = |offset: usize| DVec3::AXES[(face / 2 + offset) % 3];
-    let forward = if face % 2 == 0 { axis(0) } else { -axis(0) };
-    let row = |of: DVec3| of.extend(-of.dot(centre));
-    DMat4::from_cols(row(PROBE_ZOOM * axis(1)), row(PROBE_ZOOM * axis(2)), DVec4::W * near_m, row(forward)).transpose()
 }
 
 /// The middle of a surface that mostly faces away from it, so that it hides little of what it reflects.

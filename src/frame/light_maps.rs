@@ -158,16 +158,12 @@ impl Frame {
             self.stood.iter().filter(|(index, _)| self.casters.contains(index)).collect();
         let caster = |(index, placement): &(usize, Placement)| {
             let device_mesh = &self.buffers.meshes[self.scene.entities[*index].mesh];
-            let corner = |k: usize| {
-                let side = |axis: usize| device_mesh.extent_m[k >> axis & 1][axis];
-                placement.point(DVec3::new(side(0), side(1), side(2)))
-            };
             MapCaster {
                 entity: *index,
                 hides_suns: true,
                 mesh: &self.buffers.surface(*index).drawn,
                 world_from_object: camera::world_from_centred(placement, device_mesh.centre_m),
-                corners: std::array::from_fn(corner),
+                corners: device_mesh.corners_m().map(|corner| placement.point(corner)),
                 paint: self.paint(*index).filter(|paint| paint.alpha_cutoff > 0.0),
             }
         };

@@ -389,13 +389,11 @@ impl Frame {
 
     /// Whether the box around an entity lies in that around another, as a lamp's lining in its shade.
     fn lies_within(&self, outer: usize, entity: usize, placements: &[Placement]) -> bool {
-        let extent_m = |entity: usize| self.buffers.meshes[self.scene.entities[entity].mesh].extent_m;
-        let [low, high] = extent_m(outer);
+        let device_mesh = |entity: usize| &self.buffers.meshes[self.scene.entities[entity].mesh];
+        let [low, high] = device_mesh(outer).extent_m;
         let beyond = DVec3::splat(WITHIN * low.distance(high));
-        let corners = extent_m(entity);
-        (0..8_usize).all(|corner| {
-            let own = DVec3::from_array(std::array::from_fn(|axis| corners[corner >> axis & 1][axis]));
-            let place = placements[outer].local(placements[entity].point(own));
+        device_mesh(entity).corners_m().into_iter().all(|corner| {
+            let place = placements[outer].local(placements[entity].point(corner));
             place.cmpge(low - beyond).all() && place.cmple(high + beyond).all()
         })
     }

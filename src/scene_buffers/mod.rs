@@ -55,6 +55,11 @@ impl DeviceMesh {
     pub fn area(&self) -> Option<Area> {
         self.blocked.as_ref().map(|slot| slot.area).or(self.slots.lamp_area)
     }
+
+    /// Corners of its box, metres.
+    pub fn corners_m(&self) -> [DVec3; 8] {
+        std::array::from_fn(|k| DVec3::from_array(std::array::from_fn(|axis| self.extent_m[k >> axis & 1][axis])))
+    }
 }
 
 /// A mesh as it is lit and drawn: where its vertices and their own visibility lie. Entities share it where both are

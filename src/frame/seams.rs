@@ -1,6 +1,7 @@
 //! Where the rectangles that entities are end at boxes, as a ceiling does at its walls, they reach into these: before a sun
 //! that lies behind such a seam each of the two would let half of its light pass, and both together a quarter.
 
+use super::light_maps;
 use crate::field::cuboid::PlacedCuboid;
 use crate::field::sheet::Rectangle;
 use crate::scene::{Placement, Scene};
@@ -16,18 +17,12 @@ const GAP: f64 = 1e-3;
 /// For every entity how much longer halves of its rectangle's sides are, metres of its mesh. Things that rest count, and
 /// both ends of a side must lie at boxes.
 pub(super) fn reaches(scene: &Scene, placements: &[Placement]) -> Vec<[f64; 2]> {
-    let blocks = |&entity: &usize| {
-        let of = &scene.entities[entity];
-        of.occludes && !of.emits && scene.rests_opaque(entity)
+    let resting = light_maps::casters(scene);
+    let boxes_of = |&entity: &usize| {
+        let boxes = scene.caster(scene.entities[entity].mesh).as_boxes();
+        boxes.into_iter().map(move |own| (&placements[entity], own))
     };
-    let resting: Vec<usize> = (0..scene.data.entities.len()).filter(blocks).collect();
-    let boxes: Vec<(&Placement, PlacedCuboid)> = resting
-        .iter()
-        .flat_map(|&entity| {
-            scene.caster(scene.entities[entity].mesh).as_boxes().into_iter().map(move |own| (entity, own))
-        })
-        .map(|(entity, own)| (&placements[entity], own))
-        .collect();
+    let boxes: Vec<(&Placement, PlacedCuboid)> = resting.iter().flat_map(boxes_of).collect();
     let mut reaches = vec![[0.0; 2]; scene.entities.len()];
     for &entity in &resting {
         let mesh = scene.caster(scene.entities[entity].mesh);

@@ -97,12 +97,6 @@ struct PaintedPush {
     paint: [f32; 4],
 }
 
-impl DrawnPaint<'_> {
-    fn push(&self) -> [f32; 4] {
-        self.tint.extend(self.alpha_cutoff).to_array()
-    }
-}
-
 #[derive(Clone, Copy)]
 pub enum Look<'p> {
     /// One reflectance.
@@ -328,7 +322,10 @@ impl DrawTriangles {
         let push = EntityPush::new(entity, white);
         match paint {
             None => drawing.push(&push),
-            Some(paint) => drawing.push(&PaintedPush { entity: push, padding: [0.0; 2], paint: paint.push() }),
+            Some(DrawnPaint { tint, alpha_cutoff, .. }) => {
+                let paint = tint.extend(alpha_cutoff).to_array();
+                drawing.push(&PaintedPush { entity: push, padding: [0.0; 2], paint });
+            }
         }
         Ok(())
     }

@@ -230,16 +230,6 @@ fn reflection(plane: DVec4) -> DMat4 {
     DMat4::from_cols(column(DVec3::X), column(DVec3::Y), column(DVec3::Z), (-2.0 * plane.w * normal).extend(1.0))
 }
 
-impl Mirror {
-    /// The cameras of its pictures.
-    fn cameras(&self) -> &[SightCamera] {
-        match &self.shape {
-            Shape::Plane(plane) => std::slice::from_ref(&plane.camera),
-            Shape::Probe(probe) => &probe.cameras,
-        }
-    }
-}
-
 impl Plane {
     /// The mirror of a plane, of which the rectangle between `corners` mirrors, as a camera sees it; `part` is the size of
     /// its picture in texels.
@@ -454,7 +444,11 @@ impl Frame {
                     edges,
                 }
             };
-            mirror.cameras().iter().enumerate().map(picture).collect::<Vec<_>>()
+            let cameras: &[SightCamera] = match &mirror.shape {
+                Shape::Plane(plane) => std::slice::from_ref(&plane.camera),
+                Shape::Probe(probe) => &probe.cameras,
+            };
+            cameras.iter().enumerate().map(picture).collect::<Vec<_>>()
         };
         self.picture.mirrors.iter().enumerate().flat_map(shown).collect()
     }

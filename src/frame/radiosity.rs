@@ -196,7 +196,10 @@ impl RadiosityBuffers {
         let mut all = vec![[r, g, b, 0.0]; size_bytes as usize / 16];
         for (entity, order, values) in entities {
             let first = self.offsets[entity] as usize / 16;
-            all[first..].iter_mut().zip(quads(order, values)).for_each(|(to, from)| *to = from);
+            for (to, &v) in all[first..].iter_mut().zip(order) {
+                let [r, g, b] = values[v as usize];
+                *to = [r, g, b, 0.0];
+            }
         }
         let buffer = match &mut self.comparisons[place] {
             Some(buffer) => buffer,
@@ -212,12 +215,4 @@ impl RadiosityBuffers {
             RadiositySource::Comparison(place) => self.comparisons[place].as_ref().unwrap_or(&self.merged),
         }
     }
-}
-
-/// Values in the mesh's order of vertices, as they are stored.
-fn quads(order: &[u32], values: &[[f32; 3]]) -> impl Iterator<Item = [f32; 4]> {
-    order.iter().map(|&v| {
-        let [r, g, b] = values[v as usize];
-        [r, g, b, 0.0]
-    })
 }

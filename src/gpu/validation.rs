@@ -47,10 +47,6 @@ impl Messages {
         std::mem::take(&mut *self.0.lock().unwrap_or_else(|poisoned| poisoned.into_inner()))
     }
 
-    fn push(&self, text: String) {
-        self.0.lock().unwrap_or_else(|poisoned| poisoned.into_inner()).push(text);
-    }
-
     /// An error that quotes every message, if there is any.
     pub fn into_result(messages: Vec<String>) -> Result<()> {
         if messages.is_empty() {
@@ -84,6 +80,6 @@ pub(super) unsafe extern "system" fn on_message(
     } else {
         log::warn!("validation: {id}: {body}");
     }
-    messages.push(format!("{id}: {body}"));
+    messages.0.lock().unwrap_or_else(|poisoned| poisoned.into_inner()).push(format!("{id}: {body}"));
     vk::FALSE
 }

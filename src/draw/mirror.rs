@@ -62,8 +62,9 @@ struct FarPush {
 }
 
 /// What may be mirrors in pictures of a scene.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Mirrored {
+    #[default]
     Nothing,
     Planes,
     /// Curved surfaces, too.
@@ -105,16 +106,9 @@ impl Mirrors {
             pixels.div_ceil(texel_px).next_multiple_of(COARSEST).min(most / COARSEST * COARSEST)
         };
         let part = [fit(size[0], most / count), fit(size[1], most)];
-        let lights = PictureLights {
-            pixels: None,
-            highlights: None,
-            mirrors: 0,
-            mirrored: Mirrored::Nothing,
-            mirrored_pixels: false,
-        };
         let all = [count * part[0], part[1]];
         let light = light.map(|light| light.beside(all)).transpose()?;
-        let draw = Draw { light, ..Draw::new(device, library, all, Antialias::None, lights)? };
+        let draw = Draw { light, ..Draw::new(device, library, all, Antialias::None, PictureLights::default())? };
         let shape = draw.picture.shape;
         let of_far = ImageShape { format: vk::Format::R16G16_SFLOAT, ..shape };
         let [vertex, fragment] = ["show.vert", "mirror_far.frag"].map(|file| ShaderPermutation::new(file, 4));

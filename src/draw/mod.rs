@@ -230,7 +230,7 @@ pub struct DrawnViewport<'d> {
 pub const EVERYWHERE: [[f32; 4]; 4] = [[0.0, 0.0, 1.0, 0.0]; 4];
 
 /// How pictures evaluate sharp lights themselves.
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, Default)]
 pub struct PictureLights {
     /// By pixels, where they do.
     pub pixels: Option<SharpPermutation>,

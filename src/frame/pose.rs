@@ -228,15 +228,8 @@ impl Frame {
         EntityBounds {
             centre: placement.point(centre_m),
             radius_m: radius_m * f64::from(placement.scale),
-            reflectance: 0.0,
             occludes: if stands { Occludes::Sharp } else { Occludes::Nothing },
-            emits: false,
-            sharp: false,
-            coloured: false,
-            sheet: None,
-            radiance: 0.0,
-            facing: None,
-            lamp_maps: 0,
+            ..EntityBounds::default()
         }
     }
 

@@ -69,8 +69,9 @@ impl ClusterBounds {
 }
 
 /// Before which lights an entity stands.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Occludes {
+    #[default]
     Nothing,
     /// Before all but sharp ones: there its boxes stand in its place.
     Soft,
@@ -86,7 +87,7 @@ impl Occludes {
 }
 
 /// One entity, or one of the boxes of an entity, as the gather sees it.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct EntityBounds {
     /// Centre of the bounding sphere in the world, metres.
     pub centre: DVec3,

@@ -51,12 +51,6 @@ impl ClusterWork {
         self.recorded.store(true, Ordering::Relaxed);
         self.merged.merged_clusters as u32
     }
-
-    /// Whether a device's texel views hold the clusters and their lists.
-    pub fn fits_views(&self, device: &Device) -> bool {
-        TexelView::fits(device, ENTRY_FORMAT, self.entries.size_bytes)
-            && TexelView::fits(device, CLUSTER_FORMAT, self.clusters.size_bytes)
-    }
 }
 
 impl Frame {
@@ -147,7 +141,9 @@ impl Frame {
 
     /// Goes over to storage blocks where texel views cannot hold the clusters and lists that the next merge reads.
     fn fit_lists(&mut self) -> Result<()> {
-        if self.work.fits_views(&self.device) {
+        if TexelView::fits(&self.device, ENTRY_FORMAT, self.work.entries.size_bytes)
+            && TexelView::fits(&self.device, CLUSTER_FORMAT, self.work.clusters.size_bytes)
+        {
             return Ok(());
         }
         if let Some(sharp) = self.sharp.as_mut().filter(|sharp| sharp.permutation.reads == Reads::Texels) {

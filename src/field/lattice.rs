@@ -104,11 +104,7 @@ impl Corners {
     }
 }
 
-/// Coordinate in which shells are equally spaced; it grows inwards.
-fn chord(d: f64) -> f64 {
-    (cap_height(d) / 2.0).sqrt()
-}
-
+/// Inverse of [`Lattice::coordinate`], as [`Lattice::reach`] has distances.
 fn chord_distance(coordinate: f64) -> f64 {
     let half_angle = 2.0 * coordinate.clamp(0.0, 1.0).asin();
     if half_angle <= FRAC_PI_2 { 1.0 / half_angle.sin() } else { half_angle.sin() }
@@ -148,9 +144,9 @@ impl Lattice {
         (d * d + self.room()).sqrt()
     }
 
-    /// Coordinate in which shells are equally spaced, of a distance of at least `inner`.
+    /// Coordinate in which shells are equally spaced, of a distance of at least `inner`; it grows inwards.
     pub fn coordinate(&self, d: f64) -> f64 {
-        chord(self.reach(d))
+        (cap_height(self.reach(d)) / 2.0).sqrt()
     }
 
     /// This lattice around an object. A fit and a first shell that were chosen before stay. Otherwise the lattice takes

@@ -4,7 +4,6 @@ use crate::error::{Error, Result};
 use crate::sh::cube::FACE_COUNT;
 use glam::{DVec3, Vec3, Vec3Swizzles};
 use meshopt::{VertexDataAdapter, build_meshlets, extract_meshlet_indices};
-use rayon::prelude::*;
 use std::ops::Range;
 
 /// Triangles in a chunk. It is small enough to be culled on its own, and large enough that its draw call costs little.
@@ -46,11 +45,6 @@ impl Chunk {
         // The margin covers rounding.
         self.axis.dot(q) > (self.sine * q.length() + self.radius) * 1.0001 + 1e-5
     }
-}
-
-/// Sorts triangles along a space-filling curve. Positions lie within the unit sphere.
-pub fn sort_spatially(positions: &[Vec3], triangles: &mut [[u32; 3]]) {
-    triangles.par_sort_by_cached_key(|t| morton(t.iter().map(|i| positions[*i as usize]).sum::<Vec3>() / 3.0));
 }
 
 /// A mesh cut into chunks, one after another along a space-filling curve.

@@ -6,7 +6,7 @@
 //! Winding Numbers for Soups and Clouds*, SIGGRAPH 2018, equation 11.
 
 use super::TRANSFER_OFFSET;
-use super::chunk::sort_spatially;
+use super::chunk::morton;
 use crate::asset::topology::solid_angle;
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
@@ -43,7 +43,8 @@ impl Surface {
     /// The surface of a mesh whose positions lie within the unit sphere (see [`super::triangles::unit_positions`]).
     pub fn new(positions: &[Vec3], triangles: &[[u32; 3]]) -> Self {
         let mut order = triangles.to_vec();
-        sort_spatially(positions, &mut order);
+        // Along a space-filling curve.
+        order.par_sort_by_cached_key(|t| morton(t.iter().map(|i| positions[*i as usize]).sum::<Vec3>() / 3.0));
         let triangles: Vec<[DVec3; 3]> = order.iter().map(|t| t.map(|i| positions[i as usize].as_dvec3())).collect();
         let mut surface = Surface { triangles, nodes: Vec::new() };
         if !surface.triangles.is_empty() {
@@ -54,9 +55,11 @@ impl Surface {
 
     fn build(&mut self, range: Range<usize>) {
         let within = &self.triangles[range.clone()];
-        let (low, high) = bounds(within);
+        let corners = || within.iter().flatten().copied();
+        let low = corners().fold(DVec3::MAX, DVec3::min);
+        let high = corners().fold(DVec3::MIN, DVec3::max);
         let centre = (low + high) / 2.0;
-        let radius = within.iter().flatten().map(|p| p.distance(centre)).fold(0.0, f64::max);
+        let radius = corners().map(|p| p.distance(centre)).fold(0.0, f64::max);
         let dipole = within.iter().map(|[a, b, c]| (b - a).cross(c - a) / 2.0).sum();
         let node = self.nodes.len();
         self.nodes.push(SurfaceNode { triangles: range.clone(), centre, radius, low, high, dipole, second: 0 });
@@ -144,10 +147,6 @@ pub fn depth_at_origin(triangles: &[[DVec3; 3]]) -> Option<f64> {
     let shares: Vec<(f64, f64)> = triangles.par_chunks(4096).map(share).collect();
     let winding = shares.iter().map(|(angle, _)| angle).sum::<f64>() / (4.0 * PI);
     (winding > INSIDE).then(|| shares.iter().map(|(_, nearest)| *nearest).fold(f64::INFINITY, f64::min))
-}
-
-fn bounds(triangles: &[[DVec3; 3]]) -> (DVec3, DVec3) {
-    triangles.iter().flatten().fold((DVec3::MAX, DVec3::MIN), |(low, high), p| (low.min(*p), high.max(*p)))
 }
 
 /// Most points that a thread takes at a time. Points near the surface take far longer than those outside its box.

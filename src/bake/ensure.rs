@@ -229,7 +229,6 @@ fn ensure_fields(
 ) -> Result<(Vec<BakedMesh>, Vec<Baked>)> {
     let options = &needs.options;
     let mut baked = Vec::new();
-    let mut note = |what: &str, report| baked.extend(noted(what, report));
     // Equal meshes of two names share fields, which are looked for once.
     let mut fields: HashMap<String, Arc<ShadowField>> = HashMap::new();
     let mut silhouettes: HashMap<usize, Arc<SilhouetteField>> = HashMap::new();
@@ -244,7 +243,7 @@ fn ensure_fields(
             if !fields.contains_key(&name) {
                 let what = field_title(mesh, header);
                 let (found, report) = cache.field(baker, mesh, header, &|now, all| progress(&what, now, all))?;
-                note(&what, report);
+                baked.extend(noted(&what, report));
                 fields.insert(name.clone(), found);
             }
             *to = Some(fields[&name].clone());
@@ -252,7 +251,7 @@ fn ensure_fields(
         if first == Some(index) {
             let what = silhouette_title(mesh);
             let (found, report) = cache.silhouette(baker, mesh, options, &|now, all| progress(&what, now, all))?;
-            note(&what, report);
+            baked.extend(noted(&what, report));
             silhouettes.insert(index, found);
         }
         to.silhouette = first.map(|first| silhouettes[&first].clone());
@@ -270,7 +269,6 @@ fn ensure_fields(
 /// The scene without its meshes.
 fn ensure_surfaces(cache: &Cache, scene: &Scene, needs: &SceneNeeds, progress: SceneProgress<'_>) -> BakedScene {
     let mut baked = Vec::new();
-    let mut note = |what: &str, report| baked.extend(noted(what, report));
     let count = scene.entities.len();
     let mut scene_surfaces = Vec::new();
     let mut surface_of = vec![0; count];
@@ -280,7 +278,7 @@ fn ensure_surfaces(cache: &Cache, scene: &Scene, needs: &SceneNeeds, progress: S
     for group in &needs.surfaces.groups {
         let what = group.title();
         let (found, report) = cache.surfaces(group, &|now, all| progress(&what, now, all));
-        note(&what, report);
+        baked.extend(noted(&what, report));
         for (place, &entity) in group.entities.iter().enumerate() {
             // Entities alone share the only surface of their group.
             let member = place.min(found.len() - 1);
@@ -295,7 +293,7 @@ fn ensure_surfaces(cache: &Cache, scene: &Scene, needs: &SceneNeeds, progress: S
         scene_surfaces.extend(found.iter().cloned());
         if let Some(plan) = &group.volume {
             let (found, report) = cache.volume(group, plan, &|now, all| progress(VOLUME_TITLE, now, all));
-            note(VOLUME_TITLE, report);
+            baked.extend(noted(VOLUME_TITLE, report));
             let mut has = vec![false; count];
             group.entities.iter().zip(group.occluders()).for_each(|(&entity, blocks)| has[entity] = blocks);
             volume = (!found.blocked.is_empty()).then_some(SceneVolume { volume: found, has });

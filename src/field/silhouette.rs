@@ -211,15 +211,10 @@ impl SilhouetteField {
             let cells = f32::from_bits(first_cell + map as u32 * map_cells);
             [row(0), row(1), [texel.x, texel.y, cells, if mirrored { -1.0 } else { 1.0 }]]
         };
-        let count = self.faces().len() as f64;
+        let count = self.header.faces.len() as f64;
         let corners = self.extent().map(|corner| corner.extend(count).as_vec4().to_array());
-        let faces = self.faces().iter().rev().copied();
+        let faces = self.header.faces.iter().rev().copied();
         faces.chain(corners).chain(self.nodes.nodes.iter().flat_map(node)).collect()
-    }
-
-    /// Planes of the object's faces besides those of its box: unit normal, and distance from the centre in r.
-    pub fn faces(&self) -> &[[f32; 4]] {
-        &self.header.faces
     }
 
     pub fn has_halves(&self) -> bool {
@@ -353,7 +348,7 @@ impl SilhouetteField {
 
     /// Whether box or faces tell what neither the outline nor halves do.
     pub fn has_box(&self) -> bool {
-        !self.has_halves() && (self.extent()[1].x < NO_BOX || !self.faces().is_empty())
+        !self.has_halves() && (self.extent()[1].x < NO_BOX || !self.header.faces.is_empty())
     }
 
     /// Where a ray enters and leaves the box around the object, and the planes of its faces. If it misses one, the interval
@@ -366,7 +361,7 @@ impl SilhouetteField {
                 (f64::from(distance) - normal.dot(point)) / if along.abs() < LEAST_STEP { LEAST_STEP } else { along };
             if along <= -LEAST_STEP { [enters.max(at), leaves] } else { [enters, leaves.min(at)] }
         };
-        let [enters, leaves] = self.faces().iter().fold(slabs(self.extent(), point, direction), cut);
+        let [enters, leaves] = self.header.faces.iter().fold(slabs(self.extent(), point, direction), cut);
         if enters <= leaves { [enters, leaves] } else { [-NO_BOX, NO_BOX] }
     }
 

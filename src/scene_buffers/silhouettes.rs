@@ -62,7 +62,7 @@ impl Silhouettes {
                 let first_quad = *fields.entry(Arc::as_ptr(field)).or_insert_with(|| {
                     let first = add(&mut nodes, field.node_quads(cells.len() as u32));
                     cells.extend(field.cells());
-                    first + field.faces().len() as u32
+                    first + field.header.faces.len() as u32
                 });
                 let halves = if field.has_halves() { HAS_HALVES } else { 0 };
                 Slot { first_quad: first_quad | halves, content: field.clone() }

@@ -106,6 +106,7 @@ fn around(normal: DVec3, mut places: Vec<DVec3>) -> Vec<DVec3> {
 mod tests {
     use super::*;
     use crate::asset::generate;
+    use crate::field::silhouette::through_box;
     use crate::sh::basis::{Y00, values};
     use crate::sh::quadrature::random_direction;
 
@@ -123,9 +124,7 @@ mod tests {
             const RAYS: usize = 200_000;
             for _ in 0..RAYS {
                 let way = random_direction(&mut rng);
-                let [one, other] = [(-half - eye) / way, (half - eye) / way];
-                let hit = one.min(other).max_element() < one.max(other).min_element().max(0.0);
-                if hit && one.max(other).min_element() > 0.0 {
+                if through_box([-half, half], eye, way).is_some_and(|[_, leaves]| leaves > 0.0) {
                     let y = values(4, way);
                     wanted.iter_mut().zip(y).for_each(|(sum, y)| *sum += y * 4.0 * std::f64::consts::PI / RAYS as f64);
                 }

@@ -2,11 +2,12 @@
 
 use ::gltf::json::camera::Type;
 use ::gltf::json::validation::Checked;
-use glam::{DVec3, Vec3};
+use glam::DVec3;
 
 use super::document::Document;
 use super::notes::Notes;
 use super::tree::Stand;
+use crate::asset::Mesh;
 use crate::asset::enclose::around_boxes;
 use crate::error::Result;
 use crate::scene::data::{Camera, EntityData, Output};
@@ -82,10 +83,10 @@ pub fn camera(
     Ok(Some((camera, output)))
 }
 
-/// A sphere around entities at time 0: centre and radius in metres. Each is its mesh's bounding sphere and its data.
-pub fn bounds<'a>(entities: impl Iterator<Item = ((Vec3, f32), &'a EntityData)>) -> (DVec3, f64) {
-    let boxes = entities.map(|(sphere, entity)| {
-        let (centre, radius_m) = entity.at(0.0).sphere(sphere);
+/// A sphere around entities at time 0, each with its mesh: centre and radius in metres.
+pub fn bounds<'a>(entities: impl Iterator<Item = (&'a Mesh, &'a EntityData)>) -> (DVec3, f64) {
+    let boxes = entities.map(|(mesh, entity)| {
+        let (centre, radius_m) = entity.at(0.0).sphere(mesh.bounding_sphere());
         [centre - radius_m, centre + radius_m]
     });
     let Some([low, high]) = around_boxes(boxes) else { return (DVec3::ZERO, 1.0) };

@@ -749,23 +749,21 @@ impl Builder {
             let copies = self.bent_count;
             notes.say(format!("baked into copies of meshes ({copies}): scales that are not uniform, or mirror"));
         }
-        let spheres: HashMap<&str, (Vec3, f32)> =
-            self.meshes.iter().map(|(data, mesh)| (data.name.as_str(), mesh.bounding_sphere())).collect();
-        let spheres = || entities.iter().filter_map(|entity| Some((*spheres.get(entity.mesh.as_str())?, entity)));
-        let bounds = camera::bounds(spheres());
+        let meshes: HashMap<&str, &Mesh> =
+            self.meshes.iter().map(|(data, mesh)| (data.name.as_str(), &**mesh)).collect();
+        let things = || entities.iter().filter_map(|entity| Some((*meshes.get(entity.mesh.as_str())?, entity)));
+        let bounds = camera::bounds(things());
         let lamps = Lamps::new(document, stands, bounds, &mut notes)?;
         let camera = camera::camera(document, stands, self.options.camera.as_deref(), bounds, &mut notes)?;
         let camera_added = camera.is_none();
         let (camera, output) = camera.unwrap_or_else(|| {
-            let meshes: HashMap<&str, &Mesh> =
-                self.meshes.iter().map(|(data, mesh)| (data.name.as_str(), &**mesh)).collect();
-            let things = entities.iter().filter_map(|e| Some((*meshes.get(e.mesh.as_str())?, e.at(0.0))));
+            let things = things().map(|(mesh, entity)| (mesh, entity.at(0.0)));
             let output = Output::default();
             (framing::camera(&framing::points(things), output.aspect()), output)
         });
         // A surface of radiance 1 is white on a screen; only a brighter one is meant as a lamp.
-        let glow = spheres().filter(|(_, entity)| entity.emission.max_element() > 1.0).map(|(sphere, entity)| {
-            let (centre, radius_m) = entity.at(0.0).sphere(sphere);
+        let glow = things().filter(|(_, entity)| entity.emission.max_element() > 1.0).map(|(mesh, entity)| {
+            let (centre, radius_m) = entity.at(0.0).sphere(mesh.bounding_sphere());
             let distance_m = centre.distance(bounds.0).max(0.3 * bounds.1);
             f64::from(entity.emission.max_element()) * (radius_m / distance_m).powi(2).min(1.0)
         });

@@ -188,7 +188,11 @@ impl Scene {
     /// As [`Scene::load`].
     pub fn parse(text: &str, path: &Path, read: &dyn Fn(&Path) -> Result<Vec<u8>>) -> Result<Self> {
         let data = Data::parse(text, path)?;
-        let lines = TableLines::read(text);
+        // For messages about what is found after parsing.
+        let tables: Tables = toml::from_str(text).unwrap_or_default();
+        let line = |table: Option<&Spanned<toml::Table>>| {
+            table.map_or(1, |table| line_of(text.as_bytes(), table.span().start))
+        };
         let folder = path.parent().unwrap_or(Path::new(""));
         // A file that is not on disk may be embedded under its own name, wherever the scene file lies.
         let read = |file: &Path| {
@@ -200,10 +204,10 @@ impl Scene {
         let mut readers = gltf::Readers::new(folder);
         let mut apart = HashMap::new();
         let textures = read_textures(&data, &read, &mut readers)
-            .map_err(|(i, what)| Error::input_at(path, lines.of(lines.tables.textures.get(i)), what))?;
+            .map_err(|(i, what)| Error::input_at(path, line(tables.textures.get(i)), what))?;
         let mut meshes: Vec<Arc<Mesh>> = Vec::with_capacity(data.meshes.len());
         for (i, mesh) in data.meshes.iter().enumerate() {
-            let at = |what: String| Error::input_at(path, lines.of(lines.tables.meshes.get(i)), what);
+            let at = |what: String| Error::input_at(path, line(tables.meshes.get(i)), what);
             if data.meshes[..i].iter().any(|m| m.name == mesh.name) {
                 return Err(at(format!("there are two meshes {:?}", mesh.name)));
             }
@@ -211,10 +215,10 @@ impl Scene {
                 .map_err(|e| at(format!("mesh {:?}: {e}", mesh.name)))?;
             meshes.push(Arc::new(built));
         }
-        let fail = |i, what| Error::input_at(path, lines.of(lines.tables.entities.get(i)), what);
+        let fail = |i, what| Error::input_at(path, line(tables.entities.get(i)), what);
         let entities = resolve_all(&data, &meshes, &textures, fail)?;
         let environment = Environment::new(&data.environment, &read)
-            .map_err(|e| Error::input_at(path, lines.of(lines.tables.environment.as_ref()), e))?;
+            .map_err(|e| Error::input_at(path, line(tables.environment.as_ref()), e))?;
         Ok(Self::assemble(data, meshes, textures, entities, environment))
     }
 
@@ -731,12 +735,7 @@ fn read_named(path: &Path) -> Result<Vec<u8>> {
     read_file(path, obj::FILE_LIMIT_BYTES)
 }
 
-/// Lines at which the tables of a scene file begin, for messages about errors that are found after parsing.
-struct TableLines<'a> {
-    text: &'a str,
-    tables: Tables,
-}
-
+/// Where the tables of a scene file begin.
 #[derive(Default, Deserialize)]
 struct Tables {
     #[serde(default, rename = "texture")]
@@ -746,14 +745,4 @@ struct Tables {
     #[serde(default, rename = "entity")]
     entities: Vec<Spanned<toml::Table>>,
     environment: Option<Spanned<toml::Table>>,
-}
-
-impl<'a> TableLines<'a> {
-    fn read(text: &'a str) -> Self {
-        Self { text, tables: toml::from_str(text).unwrap_or_default() }
-    }
-
-    fn of(&self, table: Option<&Spanned<toml::Table>>) -> usize {
-        table.map_or(1, |t| line_of(self.text.as_bytes(), t.span().start))
-    }
 }

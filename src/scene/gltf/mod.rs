@@ -166,11 +166,6 @@ impl Primitive {
         self.shape.mesh(document, name, bend, self.surface.attributes.clone(), keeps)
     }
 
-    fn is_cut_into_concave_solids(&self) -> bool {
-        let numbers = self.pieces();
-        self.surface.is_solid() && pieces::any_concave(&self.shape.positions, &self.shape.triangles, numbers)
-    }
-
     /// The number of the piece that each triangle belongs to. Surfaces that let light through stay whole, and so do the
     /// many cards of a plant, and what glows in a pattern.
     fn pieces(&self) -> &[u32] {
@@ -598,7 +593,9 @@ impl Builder {
     /// How many pieces a part is cut into. Of what moves the field of each solid that is not convex would take a second.
     fn piece_count(&mut self, placed: &Placed) -> Result<u32> {
         let Some(primitive) = self.reader.primitive(placed.part)? else { return Ok(1) };
-        let stays_whole = !placed.stand.motion.is_empty() && primitive.is_cut_into_concave_solids();
+        let Primitive { shape, surface, .. } = &*primitive;
+        let any_concave = || pieces::any_concave(&shape.positions, &shape.triangles, primitive.pieces());
+        let stays_whole = !placed.stand.motion.is_empty() && surface.is_solid() && any_concave();
         Ok(if stays_whole { 1 } else { primitive.pieces().iter().max().map_or(1, |last| last + 1) })
     }
 

@@ -24,15 +24,10 @@ const PIXEL_BUDGET: usize = 1 << 28;
 /// The textures of a file that were needed so far.
 pub struct Textures {
     document: Rc<Document>,
-    images: HashMap<usize, Option<Image>>,
+    images: HashMap<usize, Option<Arc<Texels>>>,
+    /// Of images that were asked for at most [`SAMPLED_PX`] wide and high.
+    sampled: HashMap<usize, Arc<Texels>>,
     pixels: usize,
-}
-
-#[derive(Clone)]
-struct Image {
-    texels: Arc<Texels>,
-    /// At most [`SAMPLED_PX`] wide and high, once it was asked for.
-    sampled: Option<Arc<Texels>>,
 }
 
 /// A material's texture on a shape.
@@ -53,7 +48,7 @@ pub enum Glow {
 
 impl Textures {
     pub fn new(document: &Rc<Document>) -> Self {
-        Textures { document: document.clone(), images: HashMap::new(), pixels: 0 }
+        Textures { document: document.clone(), images: HashMap::new(), sampled: HashMap::new(), pixels: 0 }
     }
 
     /// A texture on a shape, if there is one and its picture has a format that is read; others are noted.
@@ -108,26 +103,23 @@ impl Textures {
     }
 
     fn sampled(&mut self, applied: &Applied) -> Arc<Texels> {
-        let image = self.images.get_mut(&applied.image).and_then(Option::as_mut);
-        let Some(image) = image else { return applied.texels.clone() };
         let halve = || {
-            let mut texels = image.texels.clone();
+            let mut texels = applied.texels.clone();
             while texels.width.max(texels.height) > SAMPLED_PX {
                 texels = Arc::new(texels.halved());
             }
             texels
         };
-        image.sampled.get_or_insert_with(halve).clone()
+        self.sampled.entry(applied.image).or_insert_with(halve).clone()
     }
 
     /// The texels of an image; `None` where its format is not read.
     pub fn texels(&mut self, index: usize) -> Result<Option<Arc<Texels>>> {
         if let Some(known) = self.images.get(&index) {
-            return Ok(known.as_ref().map(|image| image.texels.clone()));
+            return Ok(known.clone());
         }
-        let decoded = self.decode(index)?.map(|texels| Image { texels: Arc::new(texels), sampled: None });
-        let texels = decoded.as_ref().map(|image| image.texels.clone());
-        self.images.insert(index, decoded);
+        let texels = self.decode(index)?.map(Arc::new);
+        self.images.insert(index, texels.clone());
         Ok(texels)
     }
 

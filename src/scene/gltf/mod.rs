@@ -224,20 +224,19 @@ impl Stage {
     }
 
     /// All primitives, those of meshes with a pose in that of `time_s`.
-    fn parts(&self, document: &Document, time_s: f64) -> Vec<Placed> {
-        let mut parts = Vec::new();
-        for (place, stand) in self.stands.iter().enumerate() {
+    fn parts(&self, document: &Document, time_s: f64) -> impl Iterator<Item = Placed> {
+        let of_stand = move |(place, stand): (usize, &Stand)| {
             let node = &document.root.nodes[stand.node];
-            let Some(mesh) = node.mesh.map(|mesh| mesh.value()) else { continue };
+            let mesh = node.mesh?.value();
             let pose = self.is_posed(document, stand.node).then_some(PoseData { node: stand.node, time_s });
             // A skin's vertices are in the world.
             let in_world = node.skin.map(|_| Stand { node: stand.node, ..Stand::default() });
-            let stand = in_world.as_ref().unwrap_or(stand);
-            for at in 0..document.root.meshes[mesh].primitives.len() {
-                parts.push(Placed { place, stand: stand.clone(), part: Part { mesh, at, pose, piece: None } });
-            }
-        }
-        parts
+            let stand = in_world.unwrap_or_else(|| stand.clone());
+            let part = move |at| Part { mesh, at, pose, piece: None };
+            let count = document.root.meshes[mesh].primitives.len();
+            Some((0..count).map(move |at| Placed { place, stand: stand.clone(), part: part(at) }))
+        };
+        self.stands.iter().enumerate().filter_map(of_stand).flatten()
     }
 }
 
@@ -375,9 +374,9 @@ impl Reader {
         let stage = self.stage()?;
         let mut surfaces = Vec::new();
         let parts = stage.parts(&document, time_s.unwrap_or_default());
-        for Placed { stand, part, .. } in parts.iter().filter(|of| time_s.is_some() || of.part.pose.is_none()) {
+        for Placed { stand, part, .. } in parts.filter(|of| time_s.is_some() || of.part.pose.is_none()) {
             // A primitive that cannot be read is refused where it is wanted.
-            let Ok(Some(primitive)) = self.primitive(*part) else { continue };
+            let Ok(Some(primitive)) = self.primitive(part) else { continue };
             if primitive.surface.opacity < 1.0 || primitive.surface.has_alpha() {
                 continue;
             }
@@ -505,7 +504,7 @@ impl Builder {
                 self.reader.notes.leave_out(POSES);
             }
         }
-        let entities = self.entities(stage.parts(&document, time_s))?;
+        let entities = self.entities(stage.parts(&document, time_s).collect())?;
         if posed > 0 {
             self.reader.notes.say(format!("skins and morph targets ({posed}) stand in their pose at {time_s} s"));
         }

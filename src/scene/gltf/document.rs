@@ -69,14 +69,13 @@ impl Document {
         let (root, nodeless_channels) =
             parse(text).map_err(|error| Error::input(path, format!("its JSON: {error}")))?;
         check(&root).map_err(|(place, what)| Error::input(path, format!("{place}: {what}")))?;
-        let numbers_left = Cell::new(NUMBER_BUDGET);
         let mut document = Document {
             root,
             nodeless_channels,
             path: path.to_owned(),
             buffers: Vec::new(),
             bytes_left: BUFFERS_LIMIT_BYTES,
-            numbers_left,
+            numbers_left: Cell::new(NUMBER_BUDGET),
         };
         for index in 0..document.root.buffers.len() {
             let buffer = document.buffer(index, &mut rest)?;
@@ -206,9 +205,7 @@ impl Document {
 pub fn split(bytes: &[u8]) -> std::result::Result<(&[u8], Option<&[u8]>), String> {
     if !bytes.starts_with(b"glTF") {
         let is_json = bytes.trim_ascii_start().starts_with(b"{");
-        return is_json
-            .then_some((bytes, None))
-            .ok_or_else(|| "no glTF: it begins neither as GLB nor as JSON".to_owned());
+        return is_json.then_some((bytes, None)).ok_or("no glTF: it begins neither as GLB nor as JSON".into());
     }
     let word = |at: usize| bytes.get(at..at + 4).map(|b| u32::from_le_bytes([b[0], b[1], b[2], b[3]]) as usize);
     let version = word(4);

@@ -127,9 +127,8 @@ pub struct Options {
 /// [`Error::Input`] in one line, which names the file and a place of its JSON.
 pub fn load(path: &Path, options: &Options) -> Result<Import> {
     let import = Builder::new(Document::load(path)?, path, options).build()?;
-    let meshes = import.data.meshes.len();
-    let entities = import.data.entities.len();
-    check_counts(meshes, entities).map_err(|what| Error::input(path, what))?;
+    let data = &import.data;
+    check_counts(data.meshes.len(), data.entities.len()).map_err(|what| Error::input(path, what))?;
     Ok(import)
 }
 

@@ -214,8 +214,7 @@ fn cut_walls(positions: &[Vec3], triangles: &[[u32; 3]], piece: &mut Vec<u32>, l
 fn join_touching(positions: &[Vec3], triangles: &[[u32; 3]], pieces: &mut Pieces) {
     let mut joined: Vec<(Vec<u32>, [Vec3; 2])> = Vec::new();
     for mut piece in pieces.drain(..) {
-        let [low, high] = extent(positions, triangles, &piece);
-        let mut around = [low, high];
+        let mut around = extent(positions, triangles, &piece);
         let touches = |[low, high]: [Vec3; 2], other: [Vec3; 2]| {
             let slack = 1e-3 * (high - low).max(other[1] - other[0]).max_element();
             low.cmple(other[1] + slack).all() && other[0].cmple(high + slack).all()

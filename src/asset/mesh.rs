@@ -293,17 +293,7 @@ impl Mesh {
     ) -> Mesh {
         let content_hash = hash(&positions, &normals, &attributes, &triangles);
         let Attributes { colors, uvs, tints } = attributes;
-        Mesh {
-            name: self.name.clone(),
-            positions,
-            normals,
-            colors,
-            uvs,
-            tints,
-            triangles,
-            content_hash,
-            ..self.clone()
-        }
+        Mesh { positions, normals, colors, uvs, tints, triangles, content_hash, ..self.clone() }
     }
 
     /// The mesh with the backs of its triangles as triangles of their own, which are lit by themselves. It is closed no

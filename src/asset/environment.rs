@@ -255,19 +255,17 @@ impl Environment {
     /// Scenes light by them as by entities, so that they cast sharp shadows.
     pub fn discs(&self) -> Vec<Disc> {
         let EnvironmentData { sun, image, strength, .. } = &self.source;
-        let mut all: Vec<Disc> =
-            sun.as_ref().map(Sun::disc).into_iter().chain(self.dome.as_ref().map(|dome| dome.sun)).collect();
-        if let (Some(picture), Some(image)) = (&self.picture, image) {
-            let scaled = |disc: &Disc| Disc { radiance: disc.radiance * f64::from(image.scale), ..*disc };
-            all.extend(picture.lights.iter().map(scaled));
-        }
+        let image_scale = f64::from(image.as_ref().map_or(1.0, |image| image.scale));
+        let scaled = |disc: &Disc| Disc { radiance: disc.radiance * image_scale, ..*disc };
+        let of_picture = self.picture.iter().flat_map(|picture| &picture.lights).map(scaled);
+        let all = sun.iter().map(Sun::disc).chain(self.dome.iter().map(|dome| dome.sun)).chain(of_picture);
         let turn = self.turn();
         let placed = |disc: Disc| Disc {
             toward: (turn * disc.toward).normalize(),
             radiance: disc.radiance * f64::from(*strength),
             ..disc
         };
-        all.into_iter().filter(|disc| disc.radiance != DVec3::ZERO).map(placed).collect()
+        all.filter(|disc| disc.radiance != DVec3::ZERO).map(placed).collect()
     }
 
     /// Whether the radiance is the same in all directions, [`Environment::discs`] left out.

@@ -165,16 +165,11 @@ impl Shape {
         (positions, normals, self.triangles.iter().map(turned).collect())
     }
 
-    /// Numbers of an attribute for every vertex, `width` of each element, or 1 where it has fewer; `None` where the
-    /// primitive has no such attribute.
-    pub fn attribute(
-        &self,
-        document: &Document,
-        of: &Semantic,
-        widths: &[usize],
-        width: usize,
-    ) -> Result<Option<Vec<f32>>> {
+    /// Numbers of an attribute for every vertex, as many as the largest of `widths`, with 1 where an element has fewer;
+    /// `None` where the primitive has no such attribute.
+    pub fn attribute(&self, document: &Document, of: &Semantic, widths: &[usize]) -> Result<Option<Vec<f32>>> {
         let Some(index) = self.attributes.get(of) else { return Ok(None) };
+        let width = widths.iter().copied().max().unwrap_or(0);
         let numbers = accessor::numbers(document, *index, widths)?;
         let count = document.root.accessors[*index].count.0 as usize;
         let stored = numbers.len() / count.max(1);

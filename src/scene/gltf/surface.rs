@@ -104,7 +104,7 @@ impl Surface {
         let [r, g, b, mut alpha] = pbr.base_color_factor.0;
         let mut albedo = Vec3::new(r, g, b);
         let mut attributes = Attributes::default();
-        if let Some(colors) = shape.attribute(document, &Semantic::Colors(0), &[3, 4], 4)? {
+        if let Some(colors) = shape.attribute(document, &Semantic::Colors(0), &[3, 4])? {
             if alpha_blend {
                 // An entity has one opacity.
                 alpha *= colors.chunks_exact(4).map(|c| c[3]).sum::<f32>() / (colors.len() / 4) as f32;

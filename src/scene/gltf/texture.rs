@@ -71,7 +71,7 @@ impl Textures {
         });
         let transform = info.extensions.as_ref().and_then(|e| e.texture_transform.as_ref());
         let set = transform.and_then(|t| t.tex_coord).unwrap_or(info.tex_coord);
-        let places = shape.attribute(&document, &Semantic::TexCoords(set), &[2], 2)?;
+        let places = shape.attribute(&document, &Semantic::TexCoords(set), &[2])?;
         let place = |uv: &[f32]| {
             let [mut u, mut v] = [uv[0], uv[1]].map(f64::from);
             if let Some(t) = transform {

@@ -141,7 +141,7 @@ pub fn load_mesh(path: &Path) -> Result<(Mesh, Notes)> {
     let stage = Stage { stands: tree::stands(&document, &tracks, &mut notes)?, tracks };
     let mut joined = Joined::default();
     for Placed { stand, part: Part { mesh, at, pose, .. }, .. } in stage.parts(&document, 0.0) {
-        let pose = pose.map(|_| Pose::at(&document, stand.node, &stage.stands, None, 0.0)).transpose()?;
+        let pose = pose.map(|_| Pose::at(&document, &stage, stand.node, 0.0)).transpose()?;
         let Some(shape) = Shape::read(&document, mesh, at, pose.as_ref(), &mut notes)? else { continue };
         joined.add(&document, &shape, stand.rest, &Attributes::default())?;
     }
@@ -218,16 +218,12 @@ struct Stage {
 }
 
 impl Stage {
-    fn is_posed(&self, document: &Document, node: usize) -> bool {
-        pose::is_posed(document, node, self.tracks[node].as_ref())
-    }
-
     /// All primitives, those of meshes with a pose in that of `time_s`.
     fn parts(&self, document: &Document, time_s: f64) -> impl Iterator<Item = Placed> {
         let of_stand = move |(place, stand): (usize, &Stand)| {
             let node = &document.root.nodes[stand.node];
             let mesh = node.mesh?.value();
-            let pose = self.is_posed(document, stand.node).then_some(PoseData { node: stand.node, time_s });
+            let pose = pose::is_posed(document, self, stand.node).then_some(PoseData { node: stand.node, time_s });
             // A skin's vertices are in the world.
             let in_world = node.skin.map(|_| Stand { node: stand.node, ..Stand::default() });
             let stand = in_world.unwrap_or_else(|| stand.clone());
@@ -424,7 +420,7 @@ impl Reader {
         if holds != Some(mesh) {
             return Err(self.document.fail(format!("nodes[{node}]"), format!("it does not hold mesh {mesh}")));
         }
-        Pose::at(&self.document, node, &stage.stands, stage.tracks[node].as_ref(), time_s)
+        Pose::at(&self.document, &stage, node, time_s)
     }
 }
 
@@ -493,7 +489,7 @@ impl Builder {
         let stage = self.reader.stage()?;
         let time_s = self.options.time_s;
         let mut posed = 0;
-        for stand in stage.stands.iter().filter(|stand| stage.is_posed(&document, stand.node)) {
+        for stand in stage.stands.iter().filter(|stand| pose::is_posed(&document, &stage, stand.node)) {
             posed += 1;
             let skin = document.root.nodes[stand.node].skin.iter();
             let joints = skin.flat_map(|skin| &document.root.skins[skin.value()].joints);

@@ -3,11 +3,10 @@
 use ::gltf::json::mesh::{Primitive, Semantic};
 use glam::{DAffine3, DMat4, DVec3, Vec3};
 
+use super::Stage;
 use super::accessor;
-use super::animation::Tracks;
 use super::document::Document;
 use super::shape::Attributed;
-use super::tree::Stand;
 use crate::error::Result;
 
 /// Largest number of sets of four joints that a vertex follows.
@@ -23,7 +22,8 @@ pub struct Pose {
 }
 
 /// Whether a node's mesh has a pose: a skin, or morph targets that count at some time.
-pub fn is_posed(document: &Document, node: usize, tracks: Option<&Tracks>) -> bool {
+pub fn is_posed(document: &Document, stage: &Stage, node: usize) -> bool {
+    let tracks = stage.tracks[node].as_ref();
     let json = &document.root.nodes[node];
     let Some(mesh) = json.mesh else { return false };
     let weights = json.weights.as_ref().or(document.root.meshes[mesh.value()].weights.as_ref());
@@ -32,18 +32,12 @@ pub fn is_posed(document: &Document, node: usize, tracks: Option<&Tracks>) -> bo
 }
 
 impl Pose {
-    /// The pose of a node at a time. Nodes stand as `stands` says, at any time.
-    pub fn at(
-        document: &Document,
-        node: usize,
-        stands: &[Stand],
-        tracks: Option<&Tracks>,
-        time_s: f64,
-    ) -> Result<Self> {
+    /// The pose of a node at a time.
+    pub fn at(document: &Document, stage: &Stage, node: usize, time_s: f64) -> Result<Self> {
         let json = &document.root.nodes[node];
         let mesh = json.mesh.map(|mesh| &document.root.meshes[mesh.value()]);
         let stored = json.weights.as_ref().or(mesh.and_then(|mesh| mesh.weights.as_ref()));
-        let weights: Vec<f64> = match tracks.filter(|tracks| !tracks.weights.is_empty()) {
+        let weights: Vec<f64> = match stage.tracks[node].as_ref().filter(|tracks| !tracks.weights.is_empty()) {
             Some(tracks) => tracks.weights.iter().map(|keys| keys.at(time_s).x).collect(),
             None => stored.into_iter().flatten().copied().map(f64::from).collect(),
         };
@@ -66,7 +60,7 @@ impl Pose {
         }
         let joint = |(joint, inverse): (&_, DAffine3)| {
             let node = ::gltf::json::Index::value(joint);
-            let stand = stands.iter().find(|stand| stand.node == node);
+            let stand = stage.stands.iter().find(|stand| stand.node == node);
             let stand = stand.ok_or_else(|| document.fail(&place, format!("joint {node} is not in the scene")))?;
             Ok(stand.at(time_s) * inverse)
         };

@@ -125,7 +125,7 @@ impl Document {
     pub fn view(&self, index: usize) -> Result<(&[u8], Option<usize>)> {
         let view = &self.root.buffer_views[index];
         let start = view.byte_offset.unwrap_or_default().0 as usize;
-        let end = start + view.byte_length.0 as usize;
+        let end = start.saturating_add(view.byte_length.0 as usize);
         let bytes = self.slice(view.buffer.value(), start..end, &format!("bufferViews[{index}]"))?;
         Ok((bytes, view.byte_stride.map(|stride| stride.0)))
     }

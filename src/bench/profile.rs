@@ -5,8 +5,9 @@ use super::ceilings::Ceilings;
 use super::figures::{Spread, spread};
 use crate::draw::Antialias;
 use crate::error::{Error, Result};
-use crate::frame::{self, Frame};
+use crate::frame::{self, Frame, RenderOptions};
 use crate::gpu::census;
+use crate::lists::skip::Skip;
 use crate::merge::variant::Variant;
 use crate::merge::workload::Workload;
 use crate::scene::{Lights, Scene};
@@ -96,12 +97,19 @@ pub fn scene(
     runs: u32,
     at_best: &Ceilings,
 ) -> Result<Vec<ProfileRow>> {
-    let options = frame::Options { size, ..super::default_options() };
+    let in_bands = frame::Options { lights: Lights::Sh, ..super::default_options() };
     let mut merges = Vec::new();
     for &variant in chosen {
         // A pair of the merge is one of harmonics, so all lights are in bands here.
-        let options = frame::Options { variant: Some(variant), lights: Lights::Sh, ..options };
-        merges.push((variant, bench.frame(scene, options)?, Vec::new()));
+        match bench.frame(scene, frame::Options { variant: Some(variant), ..in_bands }) {
+            Ok(frame) => merges.push((variant, frame, Vec::new())),
+            // Frames have the shadows of hundreds of different things from outlines, which are smaller.
+            Err(Error::Input(why)) => {
+                (bench.progress)(&format!("merges in bands are not timed: {why}"));
+                break;
+            }
+            Err(error) => return Err(error),
+        }
     }
     for run in 0..=runs {
         let placements = scene.at(f64::from(run) / 30.0);
@@ -118,7 +126,8 @@ pub fn scene(
         let pairs = 64 * frame.merged().merged_entries as u64;
         rows.push(ProfileRow::merge(name, variant.name, times, pairs, flops, at_best));
     }
-    let mut frame = bench.frame(scene, options)?;
+    let shown = RenderOptions { size: Some(size), skip: Skip::without("unmoved"), ..RenderOptions::default() };
+    let mut frame = bench.frame(scene, shown.frame(scene)?)?;
     let ways = [Antialias::Samples, Antialias::Outlines, Antialias::None];
     for (antialias, way) in ways.into_iter().zip(["4 samples", "1 sample, outlines", "1 sample"]) {
         let times = frame_times(&mut frame, scene, antialias, runs)?;

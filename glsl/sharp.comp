@@ -2,7 +2,7 @@
 #extension GL_EXT_control_flow_attributes : require
 // Light of sharp lights on receivers, a cluster of neighbouring vertices a workgroup, added to what the merge has
 // written. A chain is what may stand between the cluster and one light: every occluder's silhouette field takes its
-// share out of every part of the light.
+// share out of every part of the light, and the maps of a lamp take that of all that stands in them.
 #include "merge_layout.glsl"
 
 layout(local_size_x = WORKGROUP) in;
@@ -67,7 +67,8 @@ void main() {
     surface.ground = surface.facings[0].normal;
     surface.lifted = vec3(0.0);
     surface.is_round = false;
-    surface.light_maps = receiver.light_maps;
+    // Maps of suns are for pixels.
+    surface.light_maps = receiver.light_maps & ~uint(LAMP_BIT - 1);
 #endif
     vec4 sum = soft_at(cluster.radiosity_first + v);
 #if EDGES

@@ -114,7 +114,7 @@ pub struct Frame {
     reflectors: mirror::Reflectors,
     /// Maps of suns, once a picture evaluates lights by them.
     sun_maps: Option<SunMaps>,
-    /// The same of lamps.
+    /// Maps of lamps, from the first frame on.
     lamp_maps: Option<LampMaps>,
     picture: FramePicture,
 }

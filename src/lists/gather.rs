@@ -2,9 +2,9 @@
 //!
 //! A list has a [`ListEntry`] for each lookup. An entry is left off when it changes no vertex of the cluster (an
 //! occluder farther than the light from all of them, or one that the skips in `merge_cone.glsl` weigh with zero
-//! everywhere), and, with a threshold `eps`, when the light that it could take or bring is bounded below it.
-//! [`crate::lists::scope`] has the rule. The order in which occluders are multiplied is the same everywhere
-//! ([`SceneBounds::order`]).
+//! everywhere), when it stands in the light's map, and, with a threshold `eps`, when the light that it could take or
+//! bring is bounded below it. [`crate::lists::scope`] has the rule. The order in which occluders are multiplied is the
+//! same everywhere ([`SceneBounds::order`]).
 //!
 //! Neighbouring clusters are gathered together: their group searches a tree of the occluders once, so that the work
 //! grows with what may matter to any of them and not with what exists. What a group leaves out, each cluster would

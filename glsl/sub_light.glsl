@@ -47,6 +47,29 @@ bool is_strip(SeenLight light) {
 // `to`: vector to the centre.
 SeenLight seen_light(vec3 to, Entity shining) {
     SeenLight light;
+#if PANELS
+    light.kind = shining.light_kind;
+    light.ratio = shining.light_ratio;
+    bool rectangle = is_rectangle(light), tube = light.kind >= LIGHT_TUBE, slat = tube && abs(shining.light_thin) < 1.0;
+    vec2 radii = (rectangle ? shining.light_size * vec2(1.0, light.ratio) : vec2(sqrt(shining.light_size))) / shining.centre.w;
+    vec3 axis = vec3(equal(uvec3(tube ? light.kind : LIGHT_TUBE), LIGHT_TUBE + uvec3(0, 1, 2)));
+    vec3 length_axis = to_world(shining, axis), wide = to_world(shining, shining.light_thin < 0.0 ? axis.yzx : axis.zxy);
+    vec3 flat_axis = cross(length_axis, wide);
+    // Of a slat the chord of its section between the corners that are outermost from the point; beyond its ends, of which
+    // more is seen then, one across the way to its middle.
+    vec2 sides = radii.y * vec2(1.0, abs(shining.light_thin)), point = -vec2(dot(wide, to), dot(flat_axis, to));
+    vec2 near = vec2(point.x < 0.0 ? -sides.x : sides.x, point.y < 0.0 ? -sides.y : sides.y);
+    bvec2 beside_it = greaterThan(abs(point), sides);
+    vec2 first = vec2(beside_it.y ? -near.x : near.x, near.y), last = vec2(near.x, beside_it.x ? -near.y : near.y);
+    vec2 middle = 0.5 * (first + last), chord = 0.5 * (last - first);
+    float off = max(length(point), 1e-30), beyond = clamp((abs(dot(length_axis, to)) - radii.x) / off, 0.0, 1.0);
+    vec2 turned = vec2(-point.y, point.x) / off;
+    turned *= dot(abs(turned), sides) * (dot(turned, chord) < 0.0 ? -1.0 : 1.0);
+    middle *= 1.0 - beyond;
+    chord = mix(chord, turned, beyond);
+    to += slat ? middle.x * wide + middle.y * flat_axis : vec3(0.0);
+    vec3 width_axis = chord.x * wide + chord.y * flat_axis;
+#endif
     light.distance = length(to);
     // From its very centre it is seen above, as the twin has it.
     light.toward = light.distance > 0.0 ? to / light.distance : vec3(0.0, 1.0, 0.0);
@@ -66,24 +89,16 @@ SeenLight seen_light(vec3 to, Entity shining) {
     light.box[1] = vec3(0.0);
 #endif
 #if PANELS
-    light.kind = shining.light_kind;
-    light.ratio = shining.light_ratio;
-    bool rectangle = is_rectangle(light), tube = light.kind >= LIGHT_TUBE;
-    vec2 radii = (rectangle ? shining.light_size * vec2(1.0, light.ratio) : vec2(sqrt(shining.light_size))) / shining.centre.w;
     mat3 axes = mat3(light.toward, light.across, light.down);
-    vec3 axis = vec3(equal(uvec3(tube ? light.kind : LIGHT_TUBE), LIGHT_TUBE + uvec3(0, 1, 2)));
-    vec3 along = to_world(shining, axis) * axes;
-    vec3 beside = cross(along, vec3(1.0, 0.0, 0.0));
-    beside = tube ? beside / max(length(beside), 1e-6) : to_world(shining, vec3(0.0, 0.0, 1.0)) * axes;
-    // A slat is as wide as it is seen to be.
-    float thin = abs(shining.light_thin);
-    float cosine = dot(to_world(shining, shining.light_thin < 0.0 ? axis.yzx : axis.zxy) * axes, beside);
-    float seen = tube && thin < 1.0 ? abs(cosine) + thin * sqrt(max(1.0 - cosine * cosine, 0.0)) : 1.0;
+    vec3 along = length_axis * axes, beside = cross(along, vec3(1.0, 0.0, 0.0));
+    beside = slat ? width_axis * axes : tube ? beside : to_world(shining, vec3(0.0, 0.0, 1.0)) * axes;
+    float seen = slat ? length(beside) / radii.y : 1.0;
     radii.y *= seen;
     light.ratio *= seen;
+    beside = tube ? beside / max(length(beside), 1e-6 * sides.x) : beside;
     light.facing = tube ? cross(along, beside) : to_world(shining, vec3(0.0, 1.0, 0.0)) * axes;
     // Of two sides that shine, the one that is seen.
-    light.facing *= light.kind == LIGHT_SHEET && light.facing.x > 0.0 ? -1.0 : 1.0;
+    light.facing *= (slat || light.kind == LIGHT_SHEET) && light.facing.x > 0.0 ? -1.0 : 1.0;
     light.half_edges[0] = radii.x * along;
     light.half_edges[1] = radii.y * beside;
     light.area = radii.x * radii.y * (rectangle ? 4.0 : PI);

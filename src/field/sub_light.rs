@@ -219,16 +219,26 @@ impl SeenLight {
     }
 
     /// The face of a panel with that bounding sphere, turned by `rotation`.
-    pub fn panel(to: DVec3, radius: f64, panel: LampFace, rotation: DQuat) -> Self {
+    pub fn panel(mut to: DVec3, radius: f64, panel: LampFace, rotation: DQuat) -> Self {
         let mut half = radius * panel.half();
         let is_rectangle = !matches!(panel, LampFace::Disc(_));
         // Along both edges, and off the side that shines.
         let axes = match panel {
             LampFace::Tube { axis, thin, .. } => {
                 let along = rotation * DVec3::AXES[axis];
-                let beside = along.cross(to).normalize_or(along.any_orthonormal_vector());
-                let wide = rotation * DVec3::AXES[(axis + if thin < 0.0 { 2 } else { 1 }) % 3];
-                half.y *= slat_share(thin.abs(), beside.dot(wide));
+                let mut beside = along.cross(to).normalize_or(along.any_orthonormal_vector());
+                if thin != 1.0 {
+                    let wide = rotation * DVec3::AXES[(axis + if thin < 0.0 { 2 } else { 1 }) % 3];
+                    let flat = along.cross(wide);
+                    let sides = half.y * DVec2::new(1.0, thin.abs());
+                    let point = -DVec2::new(wide.dot(to), flat.dot(to));
+                    let beyond = (along.dot(to).abs() - half.x) / point.length().max(f64::MIN_POSITIVE);
+                    let [middle, chord] = slat_chord(sides, point, beyond.clamp(0.0, 1.0));
+                    to += middle.x * wide + middle.y * flat;
+                    half.y = chord.length();
+                    beside = (chord.x * wide + chord.y * flat).normalize_or(wide);
+                    beside *= if along.cross(beside).dot(to) > 0.0 { -1.0 } else { 1.0 };
+                }
                 [along, beside, along.cross(beside)]
             }
             _ => [DVec3::X, DVec3::Z, DVec3::Y].map(|axis| rotation * axis),
@@ -335,10 +345,19 @@ impl SeenLight {
     }
 }
 
-/// How wide a tube is of so much thickness over width, over that width, along a direction at right angles to its axis
-/// with that cosine to its width.
-fn slat_share(thin: f64, cosine: f64) -> f64 {
-    if thin == 1.0 { 1.0 } else { cosine.abs() + thin * (1.0 - cosine * cosine).max(0.0).sqrt() }
+/// The chord of a slat's section, a rectangle with those half sides, that stands for what a point sees of it: between the
+/// two corners that are outermost from there. As far as the point lies `beyond` its ends, 0 to 1, it is across the way to
+/// the middle and as long as the section is wide from there: then more of those ends is seen. Its middle, and the half of
+/// it.
+fn slat_chord(sides: DVec2, point: DVec2, beyond: f64) -> [DVec2; 2] {
+    let near = sides.copysign(point);
+    let is_beside = point.abs().cmpgt(sides);
+    let from = DVec2::new(if is_beside.y { -near.x } else { near.x }, near.y);
+    let to = DVec2::new(near.x, if is_beside.x { -near.y } else { near.y });
+    let chord = 0.5 * (to - from);
+    let across = point.normalize_or_zero().perp();
+    let across = across * across.abs().dot(sides) * if across.dot(chord) < 0.0 { -1.0 } else { 1.0 };
+    [0.5 * (1.0 - beyond) * (from + to), chord.lerp(across, beyond)]
 }
 
 /// Irradiance of a surface at the origin by a convex polygon of radiance 1, of which it sees what is above its horizon:
@@ -449,6 +468,10 @@ mod tests {
             (DVec3::new(1.0, 0.1, 0.3), DVec3::X),
             (DVec3::new(0.8, 0.8, 1.5), DVec3::new(0.6, 0.8, 0.0)),
             (DVec3::new(0.0, 0.5, 0.4), DVec3::Y),
+            // Close above its wide side, and beside an edge of it.
+            (DVec3::new(0.01, 0.03, 0.1), DVec3::Y),
+            (DVec3::new(0.06, 0.03, 0.0), DVec3::Y),
+            (DVec3::new(0.07, 0.0, 0.2), DVec3::X),
         ] {
             let light = SeenLight::panel(to, 0.5 * size.length(), slat, DQuat::IDENTITY);
             let mut sum = 0.0;

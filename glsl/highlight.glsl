@@ -37,7 +37,9 @@ float share_by_edge(vec2 from, vec2 to) {
 struct Outline {
     vec2 ends[4];
     float lowest; // least cosine of the normal and those microfacets'
-    float above;  // share of a flat light above the surface's horizon, by the heights of those ends
+    float above;   // share of a flat light above the surface's horizon, by the heights of those ends
+    float highest; // largest cosine of the surface to them
+    float cosine;  // mean of theirs, without those below
     bool polygon;
 };
 
@@ -64,6 +66,8 @@ Outline outline_of(View view, mat3 surface, SeenLight light, mat3 axes) {
         top = middle + reach;
         bottom = middle - reach;
     }
+    outline.highest = max(top, 0.0);
+    outline.cosine = 0.25 * dot(max(heights, 0.0), vec4(1.0));
     outline.above = clamp(top / max(top - bottom, 1e-6), 0.0, 1.0);
     return outline;
 }
@@ -116,6 +120,9 @@ vec2 reflect_light(View view, vec3 to, Entity shining) {
     mat3 axes = mat3(light.toward, light.across, light.down), surface = surface_axes(view.normal);
     Outline outline = outline_of(view, surface, light, axes);
     float centre = dot(view.normal, light.toward), cosine = part_cosine(centre, light.sine);
+#if PANELS
+    cosine = is_panel(light) ? outline.cosine : cosine;
+#endif
     vec2 place;
     float share = share_in_outline(view, surface, light, axes, outline, place);
     vec3 by_axes = along_axes(light, place), along = axes * by_axes;
@@ -124,6 +131,8 @@ vec2 reflect_light(View view, vec3 to, Entity shining) {
     // Slopes have no bound at the horizon: there the light is a point.
     float omega = part_light(light, Block(vec2(0.0), 0.0, 1.0, 1.0), vec2(0.0), along_axes(light, vec2(0.0)));
     float low = lobe_of_part(view, light.toward, cosine, omega) * cosine * omega;
+    // No more than if all of it stood where the lobe is brightest, as of a panel that nearly lies in the surface.
+    value = min(value, omega * outline.highest * masking(view, cosine) / (PI * view.alpha * view.alpha));
     value = mix(low, value, clamp((outline.lowest / view.alpha - LOW_FROM) / (LOW_TO - LOW_FROM), 0.0, 1.0));
     float above = clamp(0.5 + 0.5 * centre / light.sine, 0.0, 1.0);
     bool seen = lit > 0.0;

@@ -53,7 +53,7 @@ void note_share(uint light, float irradiance) {
 #endif
 
 #if LAMPS
-float lamps = 0.0; // share of the cosine-weighted view that lamps take, which light that leaves cannot pass
+float lamps = 0.0; // share of the cosine-weighted view that moving lamps take, which light that leaves cannot pass
 #endif
 
 #if EDGES
@@ -851,7 +851,7 @@ vec3 chain_sum(Surface surface, uint i, uint end) {
     keep(shining, dark, kept_irradiance * cone, miss, MOST_MISS * white * unblocked);
 #endif
 #if LAMPS
-    lamps += irradiance / PI;
+    lamps += (shining.sun_bits & uint(LAMP_AT_REST)) == 0 ? irradiance / PI : 0.0;
 #endif
 #if COLORS
     vec3 arriving = has_colors ? colored : vec3(irradiance);

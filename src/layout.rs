@@ -112,7 +112,8 @@ shared_struct! {
         /// Of a tube: its thickness over its width, 1 of a round one; see [`crate::field::sub_light::LampFace::Tube`].
         light_thin: f32,
         /// Of a sun: the bits that a vertex has of it, see [`pack_suns`]; the last where nothing moves or lets light
-        /// through that may hide a sun of which a vertex sees all. 0 of any other light.
+        /// through that may hide a sun of which a vertex sees all. Of a lamp [`LAMP_AT_REST`] where it stands among the
+        /// links of what rests. 0 of any other light.
         sun_bits: u32,
         /// Of a light the bit of its map, if it has one; of what occludes those of the maps that hold it.
         light_maps: u32,
@@ -122,6 +123,9 @@ shared_struct! {
 /// The most suns that have maps, whose bits come first, and the most other lights.
 pub const MOST_SUN_MAPS: usize = 2;
 pub const MOST_LAMP_MAPS: usize = 32 - MOST_SUN_MAPS;
+
+/// A bit beyond those of suns, of a lamp at rest: links end at it.
+pub const LAMP_AT_REST: u32 = 1 << 30;
 
 /// The most suns of which vertices tell whether they are hidden.
 pub const MOST_SUNS: usize = 8;

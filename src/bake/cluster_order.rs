@@ -53,8 +53,9 @@ pub(crate) struct ClusterOrder {
 }
 
 /// Where vertices of a cluster share place and normal, as on a wall of which a roof divides the lit part from the dark
-/// one, those parts, which hang together by vertices, are different sides too.
-pub(crate) fn cluster_order(mesh: &Mesh) -> ClusterOrder {
+/// one, those parts, which hang together by vertices, are different sides too. So are vertices close under lamps, which
+/// `under_lamps` tells: their light is the brightest, and little but the lamp sees it.
+pub(crate) fn cluster_order(mesh: &Mesh, under_lamps: Option<&[u8]>) -> ClusterOrder {
     let mut parts = Sets::new(mesh.positions.len());
     for [a, b, c] in &mesh.triangles {
         parts.join(*a as usize, *b as usize);
@@ -67,17 +68,20 @@ pub(crate) fn cluster_order(mesh: &Mesh) -> ClusterOrder {
     };
     let mut points: Vec<Point> = unit_positions(mesh).into_iter().enumerate().map(point).collect();
     halve(&mut points);
-    let runs = points.par_chunks_mut(CLUSTER_VERTICES as usize).map(|cluster| part(mesh, cluster, &parts)).collect();
+    let runs = points
+        .par_chunks_mut(CLUSTER_VERTICES as usize)
+        .map(|cluster| part(mesh, cluster, &parts, under_lamps))
+        .collect();
     ClusterOrder { vertices: points.into_iter().map(|(_, v)| v).collect(), runs }
 }
 
 /// Sorts the vertices of a cluster by their sides, and cuts those into runs.
-fn part(mesh: &Mesh, cluster: &mut [Point], parts: &[u32]) -> RunEnds {
+fn part(mesh: &Mesh, cluster: &mut [Point], parts: &[u32], under_lamps: Option<&[u8]>) -> RunEnds {
     let divided = divided(cluster, parts);
-    let mut sides: Vec<(Option<usize>, Vec3, Vec<Point>)> = Vec::new();
+    let mut sides: Vec<((Option<usize>, u8), Vec3, Vec<Point>)> = Vec::new();
     for point in &*cluster {
         let v = point.1 as usize;
-        let of = divided.binary_search(&parts[v]).ok();
+        let of = (divided.binary_search(&parts[v]).ok(), under_lamps.map_or(0, |under| under[v]));
         let normal = mesh.normals[v];
         match sides.iter_mut().find(|(part, first, _)| *part == of && first.dot(normal) >= ONE_SIDE) {
             Some((.., points)) => points.push(*point),
@@ -160,7 +164,7 @@ mod tests {
             [0, count].into_iter().flat_map(|first| part.triangles.iter().map(move |t| t.map(|v| v + first)));
         let normals = vec![Vec3::Y; 2 * count as usize];
         let mesh = Mesh::new("cut", positions.collect(), normals, None, triangles.collect()).unwrap();
-        let order = cluster_order(&mesh);
+        let order = cluster_order(&mesh, None);
         let is_cut = |run: &&[u32]| run.iter().any(|v| mesh.positions[*v as usize].x.abs() < 1e-6);
         let has_both = |run: &&[u32]| run.iter().any(|v| *v < count) && run.iter().any(|v| *v >= count);
         let cut: Vec<&[u32]> = all_runs(&order).into_iter().filter(is_cut).collect();
@@ -177,7 +181,7 @@ mod tests {
         let normals = (0..40).flat_map(|_| bar.normals.iter().copied()).collect();
         let triangles = (0..40).flat_map(|i| bar.triangles.iter().map(move |t| t.map(|v| v + i * count)));
         let mesh = Mesh::new("bars", positions.collect(), normals, None, triangles.collect()).unwrap();
-        let order = cluster_order(&mesh);
+        let order = cluster_order(&mesh, None);
         let runs = all_runs(&order);
         let normal = |v: u32| mesh.normals[v as usize];
         assert!(

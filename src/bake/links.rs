@@ -21,6 +21,10 @@ pub const RUNS: [usize; 3] = [RUN_VERTICES, CLUSTER_VERTICES as usize, 512];
 const LEAST_SHARE: f32 = 1.0 / 64.0;
 /// Most links of a vertex. Where there are more, some take over the shares of their neighbours.
 const MOST_LINKS: usize = 192;
+/// A link with less than this share, of four rays, is blended with those of its neighbours where it leads to what lamps
+/// light from close by; and how many such links a vertex has at most.
+const FAINT: f32 = 4.0 / 576.0;
+const MOST_FAINT: usize = 32;
 /// Bits of the number of a run, below those of its share.
 pub const RUN_BITS: u32 = 20;
 /// Bits of how many links a vertex or a run has, below the number of its entity.
@@ -70,6 +74,8 @@ pub struct Runs {
     pub count: u32,
     /// Of every run, whether it has vertices of different sides, as of both faces of a wall; empty where links are known.
     pub mixed: Vec<bool>,
+    /// Whether it is of a lamp, or close under one; empty where none is.
+    pub at_lamps: Vec<bool>,
 }
 
 #[derive(Clone, Debug)]
@@ -114,7 +120,7 @@ impl Runs {
             MemberRuns { firsts, smallest, ends: ends.to_vec(), vertices }
         };
         let members = members.into_iter().map(member).collect();
-        Runs { members, count, mixed: Vec::new() }
+        Runs { members, count, mixed: Vec::new(), at_lamps: Vec::new() }
     }
 
     /// The number of the run of a size that was met.
@@ -226,6 +232,42 @@ pub fn links(mut met: Vec<Met>, runs: &Runs) -> Vec<Link> {
     links.into_iter().filter_map(link).collect()
 }
 
+/// Gives all vertices of one side of a cluster their mean of faint links to what is bright at lamps. The gap between a
+/// lamp and a ceiling is met by one ray or two, of few vertices, and each would be a blotch.
+pub fn blend_faint(of_vertices: &mut [Vec<Link>], sides: &[u8], runs: &Runs) {
+    let is_faint = |link: &Link| {
+        let (number, share) = unpack(link.packed);
+        share < FAINT && runs.at_lamps[number]
+    };
+    for side in 0..6 {
+        let mut faint: Vec<Link> = Vec::new();
+        let mut count = 0;
+        for (links, _) in of_vertices.iter_mut().zip(sides).filter(|(_, of)| **of == side) {
+            faint.extend(links.extract_if(.., |link| is_faint(link)));
+            count += 1;
+        }
+        faint.sort_by_key(|link| unpack(link.packed).0);
+        let mean = |same: &[Link]| {
+            let (number, _) = unpack(same[0].packed);
+            let share = same.iter().map(|link| unpack(link.packed).1).sum::<f32>() / count as f32;
+            (share, number as u32, same[0].direction)
+        };
+        let mut blended: Vec<(f32, u32, u32)> =
+            faint.chunk_by(|a, b| unpack(a.packed).0 == unpack(b.packed).0).map(mean).collect();
+        let whole: f32 = blended.iter().map(|link| link.0).sum();
+        blended.sort_by(|a, b| b.0.total_cmp(&a.0));
+        blended.truncate(MOST_FAINT);
+        let kept: f32 = blended.iter().map(|link| link.0).sum();
+        let link = |(share, number, direction): &(f32, u32, u32)| {
+            Some(Link { packed: pack(share * whole / kept, *number)?, direction: *direction })
+        };
+        let blended: Vec<Link> = blended.iter().filter_map(link).collect();
+        for (links, _) in of_vertices.iter_mut().zip(sides).filter(|(_, of)| **of == side) {
+            links.extend(&blended);
+        }
+    }
+}
+
 /// Links runs of at most this size.
 fn link(largest: usize, met: &[Met], runs: &Runs, links: &mut Vec<(u32, Bundle)>) {
     for of_largest in met.chunk_by(|a, b| runs.of(largest, a) == runs.of(largest, b)) {
@@ -314,6 +356,24 @@ mod tests {
         };
         let ends: Vec<_> = vertices.iter().map(ends).collect();
         Runs::new(ends.iter().map(|ends| &ends[..]))
+    }
+
+    #[test]
+    fn faint_links_at_lamps_are_shared_by_a_side() {
+        let runs = Runs { at_lamps: vec![false, true, true], ..plain(&[8]) };
+        let link = |(number, share): (u32, f32)| Link { packed: pack(share, number).unwrap(), direction: 0 };
+        let found = [vec![(0, 0.5), (1, 0.004)], vec![(0, 0.001)], vec![(1, 0.002)], vec![(2, 0.25)]];
+        let mut found = found.map(|links| links.into_iter().map(link).collect::<Vec<Link>>());
+        blend_faint(&mut found, &[0, 0, 1, 0], &runs);
+        let mean = 0.004 / 3.0;
+        let wanted =
+            [vec![(0, 0.5), (1, mean)], vec![(0, 0.001), (1, mean)], vec![(1, 0.002)], vec![(2, 0.25), (1, mean)]];
+        for (found, wanted) in found.iter().zip(wanted) {
+            let found: Vec<(usize, f32)> = found.iter().map(|link| unpack(link.packed)).collect();
+            assert_eq!(found.len(), wanted.len(), "{found:?}");
+            let is_near = |(a, b): (&(usize, f32), &(u32, f32))| a.0 == b.0 as usize && (a.1 / b.1 - 1.0).abs() < 0.005;
+            assert!(found.iter().zip(&wanted).all(is_near), "{found:?} {wanted:?}");
+        }
     }
 
     #[test]

@@ -175,6 +175,9 @@ fn cells_of(side: usize) -> Vec<Cell> {
 
 static FEW_RAYS: LazyLock<Vec<PatternRay>> = LazyLock::new(|| rays(16));
 
+/// 64 rays, to tell where lamps are.
+static FEWEST_RAYS: LazyLock<Vec<PatternRay>> = LazyLock::new(|| rays(8));
+
 /// Unit directions all over the sphere, an even number of at most 512.
 pub(super) fn directions(count: usize) -> impl Iterator<Item = Vec3A> {
     let upper = FEW_RAYS.iter().map(|ray| ray.local);
@@ -300,6 +303,8 @@ impl Seen {
 pub struct Counts<'c> {
     /// For each member whether it blocks at all.
     pub blocks: &'c [bool],
+    /// For each member whether light that bounces stays behind it: those that block, and lamps.
+    pub reflects: &'c [bool],
     /// Members whose shadows the map has, of those that block; `None` for no map.
     pub in_map: Option<&'c [u32]>,
     /// Whether it matters which parts of the sky are free.
@@ -326,6 +331,21 @@ impl Target {
     }
 }
 
+/// The share of the cosine-weighted hemisphere of a place in which the first of all members that reflect light are such
+/// as `counts` tells.
+pub(super) fn share_of(
+    blockers: &Blockers,
+    origin: Vec3A,
+    to_blockers: &Mat3A,
+    reflects: &[bool],
+    counts: impl Fn(u32) -> bool,
+) -> f64 {
+    let rays = &*FEWEST_RAYS;
+    let hits = blockers.first(origin, to_blockers, &locals(rays), reflects);
+    let met = rays.iter().zip(hits).filter(|(_, hit)| hit.is_some_and(|hit| counts(hit.member)));
+    met.map(|(ray, _)| ray.weight / PI).sum()
+}
+
 /// Rays that leave one point, in the frame of its hemisphere.
 struct Caster<'c> {
     blockers: &'c Blockers,
@@ -338,6 +358,22 @@ impl Caster<'_> {
     /// What rays meet of the members that block.
     fn cast(&self, locals: &[Vec3A]) -> Vec<Option<BlockerHit>> {
         self.blockers.first(self.origin, &self.to_blockers, locals, self.counts.blocks)
+    }
+
+    /// The first surfaces that light may bounce from.
+    fn cast_at_surfaces(&self, locals: &[Vec3A]) -> Vec<Option<BlockerHit>> {
+        self.blockers.first(self.origin, &self.to_blockers, locals, self.counts.reflects)
+    }
+
+    /// What rays meet of the members that block, of those whose first surfaces are known: the rays that meet a lamp are
+    /// cast again.
+    fn past_lamps(&self, locals: &[Vec3A], surfaces: &[Option<BlockerHit>]) -> Vec<Option<BlockerHit>> {
+        let mut hits = surfaces.to_vec();
+        let is_lamp = |i: &usize| surfaces[*i].is_some_and(|hit| !self.counts.blocks[hit.member as usize]);
+        let at_lamps: Vec<usize> = (0..hits.len()).filter(is_lamp).collect();
+        let behind = self.cast(&at_lamps.iter().map(|&i| locals[i]).collect::<Vec<_>>());
+        at_lamps.iter().zip(behind).for_each(|(&i, hit)| hits[i] = hit);
+        hits
     }
 
     /// The front that a ray meets, if it meets one. `weight`: cosine to the normal times solid angle.
@@ -375,8 +411,8 @@ impl Caster<'_> {
             let ray = |place: &DVec2| to_local * cap(*place, height).as_vec3a();
             let locals: Vec<Vec3A> = AIMED.iter().map(ray).filter(|local| local.z > 0.0).collect();
             let solid_angle = TAU * height / (AIMED_SIDE * AIMED_SIDE) as f64;
-            let hits = self.cast(&locals);
-            let rays = locals.iter().zip(&hits);
+            let surfaces = self.cast_at_surfaces(&locals);
+            let rays = locals.iter().zip(&surfaces);
             let met = rays.filter_map(|(local, hit)| self.front(*local, solid_angle * f64::from(local.z), hit));
             // What lies in two of them is met by the rays of the first.
             let is_met = |front: &Front| aimed[..number].iter().any(|(_, other)| other.has(front.place));
@@ -444,9 +480,9 @@ pub fn see(blockers: &Blockers, eye: &Eye, bands: usize, rays: Rays, counts: Cou
             let found = CellHits::new(&caster);
             let mut fronts = Vec::with_capacity(PATTERN);
             let mut free = [0.0; sky_view::CELLS];
-            found.each(|ray, hit| {
+            found.each(|ray, hit, surface| {
                 add(ray, hit);
-                fronts.extend(caster.front(ray.local, ray.weight, hit));
+                fronts.extend(caster.front(ray.local, ray.weight, surface));
                 if counts.sky && hit.is_none() {
                     free[cell(caster.to_blockers * ray.local)] += (ray.weight / PI) as f32;
                 }
@@ -471,12 +507,15 @@ struct CutCell {
 /// What all rays of a point have met.
 struct CellHits {
     hits: Vec<Option<BlockerHit>>,
+    /// The first surfaces that light may bounce from.
+    surfaces: Vec<Option<BlockerHit>>,
     /// Past what the map has; empty without a map, or where that is free.
     distances: Vec<f32>,
     /// First those that an edge of all that blocks crosses.
     cut: Vec<CutCell>,
     /// Of those first cut cells, one after the other.
     cut_hits: Vec<Option<BlockerHit>>,
+    cut_surfaces: Vec<Option<BlockerHit>>,
     /// Of all cut cells past what the map has.
     cut_distances: Vec<f32>,
 }
@@ -501,7 +540,8 @@ impl CellHits {
         // A map of no members is free, and has no edges, which rays above the horizon are for.
         let with_map = caster.counts.in_map.is_some_and(|members| !members.is_empty());
         let toward = locals(&pattern.rays[..if with_map { PATTERN + HORIZON } else { PATTERN }]);
-        let hits = caster.cast(&toward);
+        let surfaces = caster.cast_at_surfaces(&toward);
+        let hits = caster.past_lamps(&toward, &surfaces);
         let distances = if with_map { caster.map_distances_past(&toward, &hits) } else { Vec::new() };
         let at_map_edge = |cell: usize| {
             let is_free = |i: usize| distances[i].is_infinite();
@@ -519,7 +559,8 @@ impl CellHits {
         let only_in_map: Vec<usize> = others.into_iter().filter(|&cell| at_map_edge(cell)).collect();
         let cuts = |cells: &[usize]| locals(cells.iter().flat_map(|&cell| &pattern.cells[cell].cuts));
         let cut_toward = cuts(&at_edges);
-        let cut_hits = caster.cast(&cut_toward);
+        let cut_surfaces = caster.cast_at_surfaces(&cut_toward);
+        let cut_hits = caster.past_lamps(&cut_toward, &cut_surfaces);
         let mut cut_distances = Vec::new();
         if with_map {
             cut_distances = caster.map_distances_past(&cut_toward, &cut_hits);
@@ -527,19 +568,21 @@ impl CellHits {
         }
         let cut = at_edges.into_iter().map(|cell| CutCell { cell, at_map_edge: at_map_edge(cell) });
         let cut = cut.chain(only_in_map.into_iter().map(|cell| CutCell { cell, at_map_edge: true })).collect();
-        CellHits { hits, distances, cut, cut_hits, cut_distances }
+        CellHits { hits, surfaces, distances, cut, cut_hits, cut_surfaces, cut_distances }
     }
 
     /// The rays that share the hemisphere: of cells, or of their cuts.
-    fn each(&self, mut add: impl FnMut(&PatternRay, &Option<BlockerHit>)) {
+    fn each(&self, mut add: impl FnMut(&PatternRay, &Option<BlockerHit>, &Option<BlockerHit>)) {
         let pattern = &*MANY_RAYS;
         let mut whole = [true; PATTERN];
-        for (cut, hits) in self.cut.iter().zip(self.cut_hits.chunks_exact(CUTS * CUTS)) {
-            whole[cut.cell] = false;
-            pattern.cells[cut.cell].cuts.iter().zip(hits).for_each(|(ray, hit)| add(ray, hit));
+        let met = self.cut_hits.iter().zip(&self.cut_surfaces);
+        let cuts = self.cut.iter().flat_map(|cut| pattern.cells[cut.cell].cuts.iter().map(|ray| (cut.cell, ray)));
+        for ((cell, ray), (hit, surface)) in cuts.zip(met) {
+            whole[cell] = false;
+            add(ray, hit, surface);
         }
         let cells = (0..PATTERN).filter(|cell| whole[*cell]);
-        cells.for_each(|cell| add(&pattern.rays[cell], &self.hits[cell]));
+        cells.for_each(|cell| add(&pattern.rays[cell], &self.hits[cell], &self.surfaces[cell]));
     }
 
     /// Places at the edges of what the map has.
@@ -667,7 +710,8 @@ mod tests {
     /// The view from a place upwards; `in_map` are members that its map has.
     fn see_up(blockers: &Blockers, origin: Vec3, in_map: Option<&[u32]>) -> Seen {
         let eye = Eye { origin, normal: Vec3::Y, near: 0.0, rotation: DMat3::IDENTITY, radius: 1.0 };
-        let counts = Counts { blocks: &[true; 8], in_map, sky: false, targets: &[], screens: &[] };
+        let all = &[true; 8];
+        let counts = Counts { blocks: all, reflects: all, in_map, sky: false, targets: &[], screens: &[] };
         see(blockers, &eye, 4, Rays::Many, counts)
     }
 

@@ -253,7 +253,7 @@ impl<'g> Refined<'g> {
         half_lit.iter().map(|triangle| self.shared(longest(triangle))).collect()
     }
 
-    /// Edges that are longer than they are far from the middle of a lamp, and than it is wide from there, by their places.
+    /// Edges that are longer than they are far from a lamp, and than it is wide, by their places.
     fn beside_lamps(&self, least: f32) -> HashSet<Edge> {
         let lamps = self.space.lamps();
         if lamps.is_empty() {
@@ -263,11 +263,7 @@ impl<'g> Refined<'g> {
         let is_long = |&(a, b): &Edge| {
             let [from, to] = [a, b].map(|v| placed[v as usize]);
             let length = from.distance(to);
-            length > least
-                && lamps.iter().any(|(lamp, radius)| {
-                    let along = (*lamp - from).dot(to - from) / (length * length);
-                    length > radius.max(lamp.distance(from.lerp(to, along.clamp(0.0, 1.0))))
-                })
+            length > least && lamps.iter().any(|lamp| length > lamp.width.max(lamp.distance(from, to)))
         };
         self.edges().into_iter().filter(is_long).map(|edge| self.shared(edge)).collect()
     }

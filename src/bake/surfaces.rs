@@ -2,8 +2,8 @@
 //! whole group.
 
 use super::cluster_order::{ClusterOrder, cluster_order};
-use super::links::{Link, Met, Runs, links, side};
-use super::own_visibility::{Counts, Eye, Front, PATTERN, Rays, Seen, Target, directions, see};
+use super::links::{Link, Met, Runs, blend_faint, links, side};
+use super::own_visibility::{Counts, Eye, Front, PATTERN, Rays, Seen, Target, directions, see, share_of};
 use super::packet::{BlockerHit, BlockerTriangle, Blockers, Mask};
 use super::refine::{FLAT, Limits, ON_TRIANGLE, Refined, refine, sides, vertex_count};
 use super::triangles::{distinct, weights};
@@ -31,7 +31,7 @@ use std::sync::{Arc, OnceLock};
 use std::time::Instant;
 
 /// Counts in every name of the cache: another number where a bake of surfaces computes something else.
-const VERSION: u32 = 64;
+const VERSION: u32 = 65;
 /// How far towards the middle of its triangles a vertex is seen from, as a share of the way: the light of a crease is
 /// that just inside each face. Where meshes are left as they are, so are the places from which they are seen.
 const NUDGE: f32 = 0.02;
@@ -91,6 +91,8 @@ const RISES: f32 = 1e-3;
 const WAYS_OUT: [f32; 5] = [0.06, 0.15, 0.3, 0.5, 0.8];
 /// The same on the way to the vertices beside it, where the middles of all its triangles are buried too.
 const WAYS_ALONG: [f32; 2] = [0.5, 0.95];
+/// Share of its view that lamps take of a vertex close under them.
+const UNDER: f64 = 0.5;
 
 /// A place of a surface, in its member's frame.
 #[derive(Clone, Copy, Debug)]
@@ -115,7 +117,8 @@ pub struct Member {
     pub mask: Option<Arc<Texture>>,
     /// Whether it blocks sharp lights as its boxes, which stand on lists: no map has its shadows.
     pub boxed: bool,
-    /// Members that shine block the view of the sky alone: before sharp lights they stand on lists.
+    /// Members that shine block the view of the sky alone, if at all: before sharp lights they stand on lists. Light
+    /// that bounces stays behind them in any case, and from those that receive it, it bounces.
     pub emits: bool,
     pub receives: bool,
     /// Whether its surface may be refined: one at rest, as what moves is many instances of one mesh, and not one to which
@@ -181,6 +184,8 @@ pub struct BakedSurface {
     pub links: Option<Arc<Links>>,
     /// In the mesh's order of vertices [`pack_suns`]; `None` where they tell nothing.
     pub told_suns: Option<Arc<Vec<u32>>>,
+    /// In the mesh's order of vertices 1 where lamps take most of the view, and else 0; `None` where they do so nowhere.
+    pub under_lamps: Option<Arc<Vec<u8>>>,
 }
 
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -204,6 +209,7 @@ impl BakedSurface {
             near: Vec::new(),
             links: None,
             told_suns: None,
+            under_lamps: None,
         }
     }
 }
@@ -441,13 +447,21 @@ impl GroupPlan {
             space.nudges(&mesh.positions, &mesh.normals, &mesh.triangles)
         };
         let nudges: Vec<Vec<Vec3>> = spaces.par_iter().zip(&surfaces).map(of_surface).collect();
+        let under_lamps = |member: usize| spaces[member].under_lamps(&surfaces[member].mesh, &nudges[member]);
+        let under_lamps: Vec<Option<Vec<u8>>> = (0..self.members.len()).into_par_iter().map(under_lamps).collect();
+        for (surface, under) in surfaces.iter_mut().zip(under_lamps) {
+            surface.under_lamps = under.map(Arc::new);
+        }
         let is_mixed_run = |member: usize, vertices: &[u32]| {
-            let mesh = &surfaces[member].mesh;
-            is_mixed(mesh, vertices) || spaces[member].divides(mesh, &nudges[member], vertices)
+            let BakedSurface { mesh, under_lamps, .. } = &surfaces[member];
+            let is_under = |v: &u32| under_lamps.as_ref().is_some_and(|under| under[*v as usize] > 0);
+            vertices.iter().any(|v| is_under(v) != is_under(&vertices[0]))
+                || is_mixed(mesh, vertices)
+                || spaces[member].divides(mesh, &nudges[member], vertices)
         };
         let lit = |member: usize| {
             let is_mixed = |run: &[u32]| is_mixed_run(member, run);
-            Lit::new(&self.members[member].mesh, &surfaces[member].mesh, parents[member].as_deref(), &is_mixed)
+            Lit::new(&self.members[member].mesh, &surfaces[member], parents[member].as_deref(), &is_mixed)
         };
         let lit: Vec<Lit> = (0..self.members.len()).into_par_iter().map(lit).collect();
         let mut runs = Runs::new(lit.iter().map(|lit| &lit.order.runs[..]));
@@ -455,13 +469,22 @@ impl GroupPlan {
             is_mixed_run(member, &lit[member].order.vertices[first..first + count])
         };
         let all: Vec<(usize, usize, usize)> = runs.all().collect();
+        let is_at_lamp = |&(member, first, count): &(usize, usize, usize)| {
+            let vertices = &lit[member].order.vertices[first..first + count];
+            let of = &self.members[member];
+            let under = surfaces[member].under_lamps.as_ref();
+            of.emits || under.is_some_and(|under| vertices.iter().any(|v| under[*v as usize] > 0))
+        };
+        if surfaces.iter().any(|surface| surface.under_lamps.is_some()) {
+            runs.at_lamps = all.iter().map(is_at_lamp).collect();
+        }
         runs.mixed = all.into_par_iter().map(is_mixed).collect();
         let total: usize = receivers.iter().map(|&member| surfaces[member].mesh.positions.len()).sum();
         let mut done = 0;
         for &member in &receivers {
-            let mesh = surfaces[member].mesh.clone();
+            let plain = surfaces[member].clone();
             let tell = |vertices: usize| progress((total + done + vertices) as u32 / 2, total.max(1) as u32);
-            surfaces[member] = spaces[member].surface(mesh, &nudges[member], (&lit, &runs), &tell);
+            surfaces[member] = spaces[member].surface(plain, &nudges[member], (&lit, &runs), &tell);
             done += surfaces[member].mesh.positions.len();
         }
         let report = BakeReport { samples: total as u32, total: started.elapsed(), ..Default::default() };
@@ -555,7 +578,9 @@ impl<'p> Group<'p> {
         let blocks: Vec<bool> =
             (0..).zip(&self.plan.members).map(|(i, of)| (i == member && !of.transparent) || of.occludes).collect();
         let others = (0..).zip(&blocks).map(|(i, blocks)| i != member && *blocks).collect();
-        GroupSpace { group: self, member, blocks, others }
+        let is_lamp = |of: &Member| of.emits && !of.transparent;
+        let reflects = self.plan.members.iter().zip(&blocks).map(|(of, blocks)| *blocks || is_lamp(of)).collect();
+        GroupSpace { group: self, member, blocks, others, reflects }
     }
 }
 
@@ -585,6 +610,36 @@ pub(super) struct GroupSpace<'g> {
     blocks: Vec<bool>,
     /// The same without this one.
     others: Vec<bool>,
+    /// For each member whether it blocks or is a lamp.
+    reflects: Vec<bool>,
+}
+
+/// Where a lamp is: a point for a ball or a cube, a line for a tube, a rectangle for a panel.
+pub(super) struct LampBody {
+    centre: Vec3,
+    from_group: Quat,
+    /// Half its extent along its own axes, less half its thickness.
+    half: Vec3,
+    /// Half of the second largest extent.
+    pub width: f32,
+}
+
+impl LampBody {
+    /// The least distance of a line, from one point to another.
+    pub fn distance(&self, from: Vec3, to: Vec3) -> f32 {
+        let [from, to] = [from, to].map(|point| self.from_group * (point - self.centre));
+        let along = to - from;
+        let on_line = |beside: Vec3| {
+            let share = (beside - from).dot(along) / along.length_squared().max(f32::MIN_POSITIVE);
+            from + share.clamp(0.0, 1.0) * along
+        };
+        // Alternating projections: each set holds the point that is nearest to the last one of the other.
+        let mut nearest = Vec3::ZERO;
+        for _ in 0..4 {
+            nearest = on_line(nearest).clamp(-self.half, self.half);
+        }
+        on_line(nearest).distance(nearest)
+    }
 }
 
 impl GroupSpace<'_> {
@@ -666,6 +721,7 @@ impl GroupSpace<'_> {
         };
         let counts = Counts {
             blocks: &self.blocks,
+            reflects: &self.reflects,
             in_map,
             sky: group.plan.views_sky,
             targets: &group.targets,
@@ -726,11 +782,21 @@ impl GroupSpace<'_> {
         others.iter().any(|v| self.first_between(counts, place(first), place(v)).is_some())
     }
 
-    /// The bounding spheres of the group's other members that shine, in its frame.
-    pub fn lamps(&self) -> Vec<(Vec3, f32)> {
-        let members = self.group.plan.members.iter().zip(&self.group.spheres).enumerate();
+    /// The group's other members that shine, in its frame.
+    pub fn lamps(&self) -> Vec<LampBody> {
+        let group = self.group;
+        let members = group.plan.members.iter().zip(&group.boxes).enumerate();
         let lamps = members.filter(|(index, (member, _))| *index != self.member && member.emits);
-        lamps.map(|(_, (_, (centre, radius)))| (centre.as_vec3(), *radius as f32)).collect()
+        let body = |(_, (Member { placement, .. }, [low, high])): (usize, (&Member, &[DVec3; 2]))| {
+            let scale = f64::from(placement.scale) / group.radius_m;
+            let mut half = (0.5 * scale * (*high - *low)).as_vec3();
+            let mut sizes = half.to_array();
+            sizes.sort_by(f32::total_cmp);
+            half -= sizes[0];
+            let centre = group.place(placement.point(0.5 * (*low + *high))).into();
+            LampBody { centre, from_group: placement.turn().inverse().as_quat(), half, width: sizes[1] }
+        };
+        lamps.map(body).collect()
     }
 
     /// A point of the member's frame in the group's.
@@ -864,16 +930,34 @@ impl GroupSpace<'_> {
         (0..group.spheres.len()).filter(is_near).map(|member| member as u32).collect()
     }
 
+    /// See [`BakedSurface::under_lamps`].
+    fn under_lamps(&self, mesh: &Mesh, nudges: &[Vec3]) -> Option<Vec<u8>> {
+        let is_lamp = |member: u32| member as usize != self.member && self.group.plan.members[member as usize].emits;
+        if !self.own().receives || !(0..).zip(&self.reflects).any(|(member, reflects)| *reflects && is_lamp(member)) {
+            return None;
+        }
+        let turn = DMat3::from_quat(self.own().placement.turn());
+        let is_under = |((position, normal), nudge): ((&Vec3, &Vec3), &Vec3)| {
+            let to_group = Mat3A::from((turn * frame(normal.as_dvec3())).as_mat3());
+            let origin = self.placed(*position + *nudge);
+            u8::from(share_of(&self.group.blockers, origin, &to_group, &self.reflects, is_lamp) > UNDER)
+        };
+        let places = mesh.positions.par_iter().zip(&mesh.normals).zip(nudges);
+        let under: Vec<u8> = places.map(is_under).collect();
+        under.contains(&1).then_some(under)
+    }
+
     /// The surface with the own visibility of its vertices. `told` hears of the vertices that are done.
     /// The surfaces of all members, and the runs of their vertices, are what its links lead to.
     fn surface(
         &self,
-        mesh: Arc<Mesh>,
+        plain: BakedSurface,
         nudges: &[Vec3],
         (lit, runs): (&[Lit], &Runs),
         told: &dyn Fn(usize),
     ) -> BakedSurface {
         let plan = self.group.plan;
+        let BakedSurface { mesh, under_lamps, .. } = plain;
         let order = &lit[self.member].order.vertices;
         // Few meshes have buried vertices, which alone ask for their triangles.
         let around = OnceLock::new();
@@ -983,8 +1067,13 @@ impl GroupSpace<'_> {
             };
             let found: Vec<(Vec<u32>, Vec<SeenVertex>)> = batch.par_iter().map(look).collect();
             for (cluster, (members, vertices)) in batch.iter().zip(found) {
-                for (&v, vertex) in cluster.iter().zip(vertices) {
-                    let (seen, links) = &*vertex.rays;
+                let mut links_of: Vec<Vec<Link>> = vertices.iter().map(|vertex| vertex.rays.1.clone()).collect();
+                if !runs.at_lamps.is_empty() {
+                    let sides: Vec<u8> = cluster.iter().map(|&v| side(mesh.normals[v as usize])).collect();
+                    blend_faint(&mut links_of, &sides, runs);
+                }
+                for ((&v, vertex), links) in cluster.iter().zip(vertices).zip(links_of) {
+                    let seen = &vertex.rays.0;
                     linked.counts.push(links.len() as u8);
                     linked.packed.extend(links.iter().map(|link| link.packed));
                     if !plan.screens.is_empty() {
@@ -1013,6 +1102,7 @@ impl GroupSpace<'_> {
             near,
             links: (!linked.packed.is_empty()).then(|| Arc::new(linked)),
             told_suns,
+            under_lamps,
         }
     }
 }
@@ -1064,8 +1154,10 @@ struct Lit {
 impl Lit {
     /// `surface` is the mesh, or finer: then `parents` has the mesh's triangle of each of its own. `is_mixed` tells whether
     /// vertices are of different sides.
-    fn new(mesh: &Mesh, surface: &Mesh, parents: Option<&[u32]>, is_mixed: &dyn Fn(&[u32]) -> bool) -> Self {
-        let order = cluster_order(surface);
+    fn new(mesh: &Mesh, surface: &BakedSurface, parents: Option<&[u32]>, is_mixed: &dyn Fn(&[u32]) -> bool) -> Self {
+        let under_lamps = surface.under_lamps.as_ref().map(|under| &under[..]);
+        let surface = &*surface.mesh;
+        let order = cluster_order(surface, under_lamps);
         let mut places = vec![0; order.vertices.len()];
         order.vertices.iter().zip(0..).for_each(|(&v, place)| places[v as usize] = place);
         let mut mixed = vec![false; places.len()];
@@ -1105,10 +1197,13 @@ impl Lit {
                     if *cell == u32::MAX || is_within(corners, at) {
                         let place = at[0] * edges[0] + at[1] * edges[1];
                         let away = positions.map(|position| position.distance_squared(place));
-                        // The light of a run is the mean of its vertices.
-                        let is_mixed = |i: usize| mixed[places[vertices[i] as usize] as usize];
+                        // The light of a run is the mean of its vertices, and that under a lamp would shine out.
+                        let is_worse = |i: usize| {
+                            let v = vertices[i] as usize;
+                            (under_lamps.map_or(0, |under| under[v]), mixed[places[v] as usize])
+                        };
                         let nearest =
-                            (0..3).min_by(|&a, &b| is_mixed(a).cmp(&is_mixed(b)).then(away[a].total_cmp(&away[b])));
+                            (0..3).min_by(|&a, &b| is_worse(a).cmp(&is_worse(b)).then(away[a].total_cmp(&away[b])));
                         *cell = places[vertices[nearest.unwrap_or(0)] as usize];
                     }
                 }
@@ -1175,6 +1270,7 @@ struct StoredSurface {
     sky: Option<usize>,
     self_visibility: bool,
     told_suns: bool,
+    under_lamps: bool,
     /// Links, whose counts for every vertex come before them; 0 without counts where no vertex has any.
     links: usize,
     /// Clusters with near members, whose counts and numbers end the payload.
@@ -1226,7 +1322,7 @@ impl GroupPlan {
         let mut payload = Vec::new();
         let mut stored = Vec::new();
         for (member, surface) in self.members.iter().zip(surfaces) {
-            let BakedSurface { mesh, transfer, sky, self_visibility, near, links, told_suns } = surface;
+            let BakedSurface { mesh, transfer, sky, self_visibility, near, links, told_suns, under_lamps } = surface;
             let refined = !Arc::ptr_eq(mesh, &member.mesh);
             if refined {
                 payload.extend_from_slice(bytemuck::cast_slice(&mesh.positions));
@@ -1243,6 +1339,7 @@ impl GroupPlan {
             }
             payload.extend_from_slice(bytes(self_visibility.as_deref()));
             payload.extend_from_slice(bytes(told_suns.as_deref()));
+            payload.extend_from_slice(bytes(under_lamps.as_deref()));
             if let Some(links) = links {
                 payload.extend_from_slice(&links.counts);
                 payload.extend_from_slice(bytemuck::cast_slice(&links.packed));
@@ -1256,6 +1353,7 @@ impl GroupPlan {
                 sky: sky.as_ref().map(|views| views.cells.len()),
                 self_visibility: self_visibility.is_some(),
                 told_suns: told_suns.is_some(),
+                under_lamps: under_lamps.is_some(),
                 links: links.as_ref().map_or(0, |links| links.packed.len()),
                 clusters: near.len(),
             });
@@ -1301,6 +1399,7 @@ impl GroupPlan {
             let sky = sky.map(|(counts, cells)| Arc::new(SkyViews { of_world, counts, cells }));
             let self_visibility = rest.take_if(stored.self_visibility, vertices * BYTES)?.map(Arc::new);
             let told_suns = rest.take_if(stored.told_suns, vertices)?.map(Arc::new);
+            let under_lamps = rest.take_if(stored.under_lamps, vertices)?.map(Arc::new);
             let links = rest.take_counted(vertices, (stored.links > 0).then_some(stored.links))?;
             let directions = rest.take(if self.screens.is_empty() { 0 } else { stored.links })?;
             let links = links.map(|(counts, packed)| Arc::new(Links { counts, packed, directions }));
@@ -1309,7 +1408,7 @@ impl GroupPlan {
                 let count = rest.take::<u32>(1)?[0];
                 near.push(rest.take(count as usize)?);
             }
-            surfaces.push(BakedSurface { mesh, transfer, sky, self_visibility, near, links, told_suns });
+            surfaces.push(BakedSurface { mesh, transfer, sky, self_visibility, near, links, told_suns, under_lamps });
         }
         rest.0.is_empty().then_some(surfaces)
     }

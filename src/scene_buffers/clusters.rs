@@ -24,7 +24,7 @@ mod tests {
     use crate::bake::cluster_order::cluster_order;
 
     fn places(mesh: &Mesh) -> Vec<u32> {
-        let order = cluster_order(mesh).vertices;
+        let order = cluster_order(mesh, None).vertices;
         let mut sorted = order.clone();
         sorted.sort_unstable();
         assert!(sorted.iter().copied().eq(0..mesh.positions.len() as u32), "{}: every vertex once", mesh.name);

@@ -19,7 +19,7 @@ use crate::field::sub_light::{
 };
 use crate::gpu::{Bind, Buffer, Commands, ComputePipeline, Device, TexelView};
 use crate::layout::{
-    CLUSTER_FORMAT, CLUSTER_VERTICES, ENTRY_BITS, ENTRY_FORMAT, MOST_SUN_MAPS, QUAD_FORMAT, SHOWN_LIGHTS,
+    CLUSTER_FORMAT, CLUSTER_VERTICES, ENTRY_BITS, ENTRY_FORMAT, LAMP_AT_REST, MOST_SUN_MAPS, QUAD_FORMAT, SHOWN_LIGHTS,
 };
 use crate::merge::variant::Reads;
 use crate::shaders::{Library, ShaderPermutation};
@@ -189,6 +189,7 @@ impl SharpPermutation {
             .define("SHOWN", self.gloss)
             .define("ALL_SHOWN_QUADS", SHOWN_LIGHTS as u32 / 4)
             .define("LAMPS", self.lamps)
+            .define("LAMP_AT_REST", LAMP_AT_REST)
             .define("ROLLED", self.rolled)
             .define("NODE_CELLS", self.silhouette.cells)
             .define("MAP", self.silhouette.map_px)

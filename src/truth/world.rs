@@ -235,19 +235,22 @@ impl<'s> World<'s> {
         })
     }
 
-    /// The first surface that a ray (unit direction) from a point of a surface meets, of entities that occlude; `None`
-    /// also past what reflects nothing: a transparent entity, which keeps its share of rays back, and a lamp, whose own
-    /// light is counted as direct light.
+    /// The first surface that a ray (unit direction) from a point of a surface meets, of entities that occlude and of lamps
+    /// that reflect, whose own light is counted as direct light; `None` also past what reflects nothing: a transparent
+    /// entity, which keeps its share of rays back, and other lamps.
     pub fn first_surface(&self, view: &VertexView, direction: DVec3) -> Option<(usize, SurfaceHit)> {
-        let others = self.occluders(view);
-        let (panes, others): (Vec<_>, Vec<_>) =
-            others.iter().chain(&view.own).partition(|sight| self.scene.entities[sight.entity].transparent);
-        let may_meet = |sight: &&EntityView| sight.entry(direction.as_vec3a(), 1.0).is_some();
-        let met = others.into_iter().filter(may_meet);
-        let met = met.filter_map(|sight| Some((sight, self.first_hit_m(sight, direction)?)));
-        let (sight, limit_m) = met.min_by(|a, b| a.1.total_cmp(&b.1))?;
-        let lamps = self.lights(view);
-        let is_kept_back = panes.into_iter().chain(&lamps).any(|sight| self.blocks(sight, direction, limit_m));
+        let entities = &self.scene.entities;
+        let lamps = self.lights(view).into_iter().filter(|lamp| !entities[lamp.entity].occludes);
+        let met = self.occluders(view).into_iter().chain(view.own).chain(lamps);
+        let may_meet = |sight: &EntityView| sight.entry(direction.as_vec3a(), 1.0).is_some();
+        let reflects = |sight: &EntityView| {
+            let of = &entities[sight.entity];
+            !of.transparent && (of.occludes || of.receives)
+        };
+        let (others, dark): (Vec<_>, Vec<_>) = met.filter(may_meet).partition(reflects);
+        let hits = others.iter().filter_map(|sight| Some((sight, self.first_hit_m(sight, direction)?)));
+        let (sight, limit_m) = hits.min_by(|a, b| a.1.total_cmp(&b.1))?;
+        let is_kept_back = dark.iter().any(|sight| self.blocks(sight, direction, limit_m));
         if is_kept_back { None } else { Some((sight.entity, self.surface_hit(sight, direction)?)) }
     }
 

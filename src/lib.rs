@@ -53,9 +53,9 @@
 //! - Boxes block sharp lights in closed form too ([`field::cuboid`]), and so do solids with square corners, as houses
 //!   and stairs, as overlapping boxes ([`asset::Mesh::boxes`]). A closed surface that lets light through and holds a
 //!   lamp takes its share once of all that leaves it.
-//! - Bounces: every vertex of a rigid group has links to runs of vertices that it sees, and reads the occlusion fields of
-//!   what moves around it for the light that comes from there ([`bounce`]); boxes that move hide links. All that reflects
-//!   passes its base colour's share of light on as a diffuse surface does, metals too.
+//! - Bounces: every vertex of a rigid group has links to runs of vertices that it sees, up to lamps at rest, and reads
+//!   the occlusion fields of what moves around it for the light that comes from there ([`bounce`]); boxes that move hide
+//!   links. All that reflects passes its base colour's share of light on as a diffuse surface does, metals too.
 //! - Gloss: roughness, metal and a base colour as in glTF ([`gloss`]). The merge leaves the transfer past everything, of
 //!   which the share of a reflected sky follows for any view. The rest of a lobe is filled with bounced light: along a
 //!   vertex's links by where they lead, and alike with that of what moves. Flat faces of a low roughness, and what

@@ -36,7 +36,7 @@ float share_by_edge(vec2 from, vec2 to) {
 // The light's outline as slopes: the ends of two diameters of a disc, or the corners of a rectangle.
 struct Outline {
     vec2 ends[4];
-    float lowest; // least cosine of the normal and those microfacets'
+    float lowest;  // least cosine of the normal and those microfacets'
     float above;   // share of a flat light above the surface's horizon, by the heights of those ends
     float highest; // largest cosine of the surface to them
     float cosine;  // mean of theirs, without those below

@@ -368,11 +368,9 @@ impl Caster<'_> {
     /// What rays meet of the members that block, of those whose first surfaces are known: the rays that meet a lamp are
     /// cast again.
     fn past_lamps(&self, locals: &[Vec3A], surfaces: &[Option<BlockerHit>]) -> Vec<Option<BlockerHit>> {
+        let is_lamp = |hit: BlockerHit| !self.counts.blocks[hit.member as usize];
         let mut hits = surfaces.to_vec();
-        let is_lamp = |i: &usize| surfaces[*i].is_some_and(|hit| !self.counts.blocks[hit.member as usize]);
-        let at_lamps: Vec<usize> = (0..hits.len()).filter(is_lamp).collect();
-        let behind = self.cast(&at_lamps.iter().map(|&i| locals[i]).collect::<Vec<_>>());
-        at_lamps.iter().zip(behind).for_each(|(&i, hit)| hits[i] = hit);
+        replace_past(surfaces, is_lamp, locals, &mut hits, |locals| self.cast(locals));
         hits
     }
 
@@ -429,13 +427,24 @@ impl Caster<'_> {
     /// The same of rays whose first hits are known: only those that meet what the map does not count are cast again.
     fn map_distances_past(&self, locals: &[Vec3A], hits: &[Option<BlockerHit>]) -> Vec<f32> {
         let in_map = self.counts.in_map.expect("asked for maps alone");
+        let is_other = |hit: BlockerHit| !in_map.contains(&hit.member);
         let mut distances: Vec<f32> = hits.iter().map(distance).collect();
-        let is_other = |i: &usize| hits[*i].is_some_and(|hit| !in_map.contains(&hit.member));
-        let others: Vec<usize> = (0..hits.len()).filter(is_other).collect();
-        let behind = self.map_distances(&others.iter().map(|&i| locals[i]).collect::<Vec<_>>());
-        others.iter().zip(behind).for_each(|(&i, distance)| distances[i] = distance);
+        replace_past(hits, is_other, locals, &mut distances, |locals| self.map_distances(locals));
         distances
     }
+}
+
+/// Casts the rays again that meet what is passed by, and replaces what is known of them.
+fn replace_past<T>(
+    hits: &[Option<BlockerHit>],
+    is_passed: impl Fn(BlockerHit) -> bool,
+    locals: &[Vec3A],
+    known: &mut [T],
+    cast: impl Fn(&[Vec3A]) -> Vec<T>,
+) {
+    let again: Vec<usize> = (0..hits.len()).filter(|&i| hits[i].is_some_and(&is_passed)).collect();
+    let behind = cast(&again.iter().map(|&i| locals[i]).collect::<Vec<_>>());
+    again.into_iter().zip(behind).for_each(|(i, found)| known[i] = found);
 }
 
 fn distance(hit: &Option<BlockerHit>) -> f32 {

@@ -7,7 +7,6 @@ use crate::draw::Antialias;
 use crate::error::{Error, Result};
 use crate::frame::{self, Frame, RenderOptions};
 use crate::gpu::census;
-use crate::lists::skip::Skip;
 use crate::merge::variant::Variant;
 use crate::merge::workload::Workload;
 use crate::scene::{Lights, Scene};
@@ -126,7 +125,7 @@ pub fn scene(
         let pairs = 64 * frame.merged().merged_entries as u64;
         rows.push(ProfileRow::merge(name, variant.name, times, pairs, flops, at_best));
     }
-    let shown = RenderOptions { size: Some(size), skip: Skip::without("unmoved"), ..RenderOptions::default() };
+    let shown = RenderOptions { size: Some(size), skip: in_bands.skip, ..RenderOptions::default() };
     let mut frame = bench.frame(scene, shown.frame(scene)?)?;
     let ways = [Antialias::Samples, Antialias::Outlines, Antialias::None];
     for (antialias, way) in ways.into_iter().zip(["4 samples", "1 sample, outlines", "1 sample"]) {

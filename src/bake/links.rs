@@ -9,9 +9,11 @@
 //! group.
 
 use super::cluster_order::{CLUSTER_RUNS, RUN_VERTICES, RunEnds, runs};
+use super::own_visibility::PATTERN;
 use crate::layout::CLUSTER_VERTICES;
 use crate::shaders::ShaderPermutation;
 use glam::Vec3;
+use std::collections::BTreeMap;
 use std::ops::Range;
 
 /// Most vertices of a run, in the order of clusters: the smallest runs, which are of one side, clusters, and groups of
@@ -23,7 +25,7 @@ const LEAST_SHARE: f32 = 1.0 / 64.0;
 const MOST_LINKS: usize = 192;
 /// A link with less than this share, of four rays, is blended with those of its neighbours where it leads to what lamps
 /// light from close by; and how many such links a vertex has at most.
-const FAINT: f32 = 4.0 / 576.0;
+const FAINT: f32 = 4.0 / PATTERN as f32;
 const MOST_FAINT: usize = 32;
 /// Bits of the number of a run, below those of its share.
 pub const RUN_BITS: u32 = 20;
@@ -232,40 +234,35 @@ pub fn links(mut met: Vec<Met>, runs: &Runs) -> Vec<Link> {
     links.into_iter().filter_map(link).collect()
 }
 
-/// Gives all vertices of one side of a cluster their mean of faint links to what is bright at lamps. The gap between a
-/// lamp and a ceiling is met by one ray or two, of few vertices, and each would be a blotch.
-pub fn blend_faint(of_vertices: &mut [Vec<Link>], sides: &[u8], runs: &Runs) {
+/// The links of a cluster's vertices, of which all of one side have the mean of their faint links to what is bright at
+/// lamps. The gap between a lamp and a ceiling is met by one ray or two, of few vertices, and each would be a blotch.
+pub fn blend_faint(of_vertices: Vec<Vec<Link>>, sides: &[u8], runs: &Runs) -> Vec<Vec<Link>> {
     let is_faint = |link: &Link| {
         let (number, share) = unpack(link.packed);
         share < FAINT && runs.at_lamps[number]
     };
+    let (faint, mut others): (Vec<Vec<Link>>, Vec<Vec<Link>>) =
+        of_vertices.into_iter().map(|links| links.into_iter().partition(is_faint)).unzip();
     for side in 0..6 {
-        let mut faint: Vec<Link> = Vec::new();
-        let mut count = 0;
-        for (links, _) in of_vertices.iter_mut().zip(sides).filter(|(_, of)| **of == side) {
-            faint.extend(links.extract_if(.., |link| is_faint(link)));
-            count += 1;
+        let of_side = || (0..sides.len()).filter(|&at| sides[at] == side);
+        let count = of_side().count() as f32;
+        let mut means: BTreeMap<usize, (f32, u32)> = BTreeMap::new();
+        for link in of_side().flat_map(|at| &faint[at]) {
+            let (number, share) = unpack(link.packed);
+            means.entry(number).or_insert((0.0, link.direction)).0 += share / count;
         }
-        faint.sort_by_key(|link| unpack(link.packed).0);
-        let mean = |same: &[Link]| {
-            let (number, _) = unpack(same[0].packed);
-            let share = same.iter().map(|link| unpack(link.packed).1).sum::<f32>() / count as f32;
-            (share, number as u32, same[0].direction)
+        let mut means: Vec<(usize, (f32, u32))> = means.into_iter().collect();
+        let whole: f32 = means.iter().map(|(_, (share, _))| share).sum();
+        means.sort_by(|(_, a), (_, b)| b.0.total_cmp(&a.0));
+        means.truncate(MOST_FAINT);
+        let kept: f32 = means.iter().map(|(_, (share, _))| share).sum();
+        let link = |(number, (share, direction)): (usize, (f32, u32))| {
+            Some(Link { packed: pack(share * whole / kept, number as u32)?, direction })
         };
-        let mut blended: Vec<(f32, u32, u32)> =
-            faint.chunk_by(|a, b| unpack(a.packed).0 == unpack(b.packed).0).map(mean).collect();
-        let whole: f32 = blended.iter().map(|link| link.0).sum();
-        blended.sort_by(|a, b| b.0.total_cmp(&a.0));
-        blended.truncate(MOST_FAINT);
-        let kept: f32 = blended.iter().map(|link| link.0).sum();
-        let link = |(share, number, direction): &(f32, u32, u32)| {
-            Some(Link { packed: pack(share * whole / kept, *number)?, direction: *direction })
-        };
-        let blended: Vec<Link> = blended.iter().filter_map(link).collect();
-        for (links, _) in of_vertices.iter_mut().zip(sides).filter(|(_, of)| **of == side) {
-            links.extend(&blended);
-        }
+        let blended: Vec<Link> = means.into_iter().filter_map(link).collect();
+        of_side().for_each(|at| others[at].extend(&blended));
     }
+    others
 }
 
 /// Links runs of at most this size.
@@ -363,8 +360,8 @@ mod tests {
         let runs = Runs { at_lamps: vec![false, true, true], ..plain(&[8]) };
         let link = |(number, share): (u32, f32)| Link { packed: pack(share, number).unwrap(), direction: 0 };
         let found = [vec![(0, 0.5), (1, 0.004)], vec![(0, 0.001)], vec![(1, 0.002)], vec![(2, 0.25)]];
-        let mut found = found.map(|links| links.into_iter().map(link).collect::<Vec<Link>>());
-        blend_faint(&mut found, &[0, 0, 1, 0], &runs);
+        let found = found.map(|links| links.into_iter().map(link).collect::<Vec<Link>>());
+        let found = blend_faint(found.to_vec(), &[0, 0, 1, 0], &runs);
         let mean = 0.004 / 3.0;
         let wanted =
             [vec![(0, 0.5), (1, mean)], vec![(0, 0.001), (1, mean)], vec![(1, 0.002)], vec![(2, 0.25), (1, mean)]];

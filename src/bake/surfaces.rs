@@ -117,9 +117,10 @@ pub struct Member {
     pub mask: Option<Arc<Texture>>,
     /// Whether it blocks sharp lights as its boxes, which stand on lists: no map has its shadows.
     pub boxed: bool,
-    /// Members that shine block the view of the sky alone, if at all: before sharp lights they stand on lists. Light
-    /// that bounces stays behind them in any case, and from those that receive it, it bounces.
+    /// Members that shine block the view of the sky alone: before sharp lights they stand on lists.
     pub emits: bool,
+    /// Whether it is a lamp at rest: light that bounces stays behind it, and bounces from it if it receives that.
+    pub ends_links: bool,
     pub receives: bool,
     /// Whether its surface may be refined: one at rest, as what moves is many instances of one mesh, and not one to which
     /// a user gave finer faces than its shape needs.
@@ -185,7 +186,7 @@ pub struct BakedSurface {
     /// In the mesh's order of vertices [`pack_suns`]; `None` where they tell nothing.
     pub told_suns: Option<Arc<Vec<u32>>>,
     /// In the mesh's order of vertices 1 where lamps take most of the view, and else 0; `None` where they do so nowhere.
-    pub under_lamps: Option<Arc<Vec<u8>>>,
+    under_lamps: Option<Arc<Vec<u8>>>,
 }
 
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -199,6 +200,11 @@ pub struct Links {
 }
 
 impl BakedSurface {
+    /// The order of its vertices in clusters.
+    pub(crate) fn order(&self) -> ClusterOrder {
+        cluster_order(&self.mesh, self.under_lamps.as_ref().map(|under| &under[..]))
+    }
+
     /// A mesh as it is, which sees nothing of itself.
     pub fn plain(mesh: &Arc<Mesh>) -> Self {
         BakedSurface {
@@ -240,6 +246,7 @@ impl SurfacePlan {
                 mask: scene.mask(entity).cloned(),
                 boxed: scene.casts_as_boxes(entity),
                 emits: of.emits,
+                ends_links: scene.is_lamp_at_rest(entity),
                 receives: of.receives,
                 refines,
             }
@@ -252,7 +259,7 @@ impl SurfacePlan {
         for entities in groups.members() {
             let members: Vec<Member> = if let [only] = entities[..] {
                 // What an entity blocks of its own view does not depend on its place.
-                let member = Member { emits: false, ..member(only, AT_ORIGIN) };
+                let member = Member { emits: false, ends_links: false, ..member(only, AT_ORIGIN) };
                 let member = Member { occludes: !member.transparent, ..member };
                 let kind = [member.receives, member.refines, member.transparent, member.boxed];
                 let plan = alone.entry((member.mesh.content_hash(), kind, member.mask.as_ref().map(Arc::as_ptr)));
@@ -318,6 +325,7 @@ impl GroupPlan {
             mask: None,
             boxed: false,
             emits: false,
+            ends_links: false,
             receives: true,
             refines: false,
         }];
@@ -360,7 +368,7 @@ impl GroupPlan {
                 format!("{:?}", (member.placement, member.occludes, member.emits, member.receives, member.refines))
                     .as_bytes(),
             );
-            hasher.update(&[member.transparent, member.boxed].map(u8::from));
+            hasher.update(&[member.transparent, member.boxed, member.ends_links].map(u8::from));
             if let Some((mask, texels)) = member.mask.as_ref().and_then(|mask| Some((mask, mask.texels.as_ref()?))) {
                 hasher.update(format!("{:?}", (mask.wrap, mask.alpha_cutoff, texels.width)).as_bytes());
                 hasher.update(texels.rgba.as_flattened());
@@ -473,7 +481,7 @@ impl GroupPlan {
             let vertices = &lit[member].order.vertices[first..first + count];
             let of = &self.members[member];
             let under = surfaces[member].under_lamps.as_ref();
-            of.emits || under.is_some_and(|under| vertices.iter().any(|v| under[*v as usize] > 0))
+            of.ends_links || under.is_some_and(|under| vertices.iter().any(|v| under[*v as usize] > 0))
         };
         if surfaces.iter().any(|surface| surface.under_lamps.is_some()) {
             runs.at_lamps = all.iter().map(is_at_lamp).collect();
@@ -578,8 +586,7 @@ impl<'p> Group<'p> {
         let blocks: Vec<bool> =
             (0..).zip(&self.plan.members).map(|(i, of)| (i == member && !of.transparent) || of.occludes).collect();
         let others = (0..).zip(&blocks).map(|(i, blocks)| i != member && *blocks).collect();
-        let is_lamp = |of: &Member| of.emits && !of.transparent;
-        let reflects = self.plan.members.iter().zip(&blocks).map(|(of, blocks)| *blocks || is_lamp(of)).collect();
+        let reflects = self.plan.members.iter().zip(&blocks).map(|(of, blocks)| *blocks || of.ends_links).collect();
         GroupSpace { group: self, member, blocks, others, reflects }
     }
 }
@@ -932,8 +939,9 @@ impl GroupSpace<'_> {
 
     /// See [`BakedSurface::under_lamps`].
     fn under_lamps(&self, mesh: &Mesh, nudges: &[Vec3]) -> Option<Vec<u8>> {
-        let is_lamp = |member: u32| member as usize != self.member && self.group.plan.members[member as usize].emits;
-        if !self.own().receives || !(0..).zip(&self.reflects).any(|(member, reflects)| *reflects && is_lamp(member)) {
+        let members = &self.group.plan.members;
+        let is_lamp = |member: u32| member as usize != self.member && members[member as usize].ends_links;
+        if !self.own().receives || !(0..members.len() as u32).any(is_lamp) {
             return None;
         }
         let turn = DMat3::from_quat(self.own().placement.turn());
@@ -1063,17 +1071,19 @@ impl GroupSpace<'_> {
                     // Suns have sharp edges, which each vertex finds by itself.
                     SeenVertex { transfer: self.transfer(&rays.0, normal), suns: self.seen_suns(from, normal), rays }
                 };
-                (near, each.map(every).collect())
-            };
-            let found: Vec<(Vec<u32>, Vec<SeenVertex>)> = batch.par_iter().map(look).collect();
-            for (cluster, (members, vertices)) in batch.iter().zip(found) {
-                let mut links_of: Vec<Vec<Link>> = vertices.iter().map(|vertex| vertex.rays.1.clone()).collect();
-                if !runs.at_lamps.is_empty() {
+                let vertices: Vec<SeenVertex> = each.map(every).collect();
+                let blended = (!runs.at_lamps.is_empty()).then(|| {
+                    let links = vertices.iter().map(|vertex| vertex.rays.1.clone()).collect();
                     let sides: Vec<u8> = cluster.iter().map(|&v| side(mesh.normals[v as usize])).collect();
-                    blend_faint(&mut links_of, &sides, runs);
-                }
-                for ((&v, vertex), links) in cluster.iter().zip(vertices).zip(links_of) {
-                    let seen = &vertex.rays.0;
+                    blend_faint(links, &sides, runs)
+                });
+                (near, vertices, blended)
+            };
+            let found: Vec<(Vec<u32>, Vec<SeenVertex>, Option<Vec<Vec<Link>>>)> = batch.par_iter().map(look).collect();
+            for (cluster, (members, vertices, blended)) in batch.iter().zip(found) {
+                for (at, (&v, vertex)) in cluster.iter().zip(vertices).enumerate() {
+                    let (seen, own_links) = &*vertex.rays;
+                    let links = blended.as_ref().map_or(own_links, |blended| &blended[at]);
                     linked.counts.push(links.len() as u8);
                     linked.packed.extend(links.iter().map(|link| link.packed));
                     if !plan.screens.is_empty() {
@@ -1155,9 +1165,8 @@ impl Lit {
     /// `surface` is the mesh, or finer: then `parents` has the mesh's triangle of each of its own. `is_mixed` tells whether
     /// vertices are of different sides.
     fn new(mesh: &Mesh, surface: &BakedSurface, parents: Option<&[u32]>, is_mixed: &dyn Fn(&[u32]) -> bool) -> Self {
-        let under_lamps = surface.under_lamps.as_ref().map(|under| &under[..]);
-        let surface = &*surface.mesh;
-        let order = cluster_order(surface, under_lamps);
+        let order = surface.order();
+        let BakedSurface { mesh: surface, under_lamps, .. } = surface;
         let mut places = vec![0; order.vertices.len()];
         order.vertices.iter().zip(0..).for_each(|(&v, place)| places[v as usize] = place);
         let mut mixed = vec![false; places.len()];
@@ -1200,7 +1209,7 @@ impl Lit {
                         // The light of a run is the mean of its vertices, and that under a lamp would shine out.
                         let is_worse = |i: usize| {
                             let v = vertices[i] as usize;
-                            (under_lamps.map_or(0, |under| under[v]), mixed[places[v] as usize])
+                            (under_lamps.as_ref().map_or(0, |under| under[v]), mixed[places[v] as usize])
                         };
                         let nearest =
                             (0..3).min_by(|&a, &b| is_worse(a).cmp(&is_worse(b)).then(away[a].total_cmp(&away[b])));

@@ -10,7 +10,7 @@ use crate::layout::{self, CLUSTER_VERTICES, LAMP_AT_REST, MOST_SUN_MAPS, NONE, p
 use crate::lists::gather::{ClusterBounds, EntityBounds, Globe, Occludes, OutlineShape, OutlineView, SceneBounds};
 use crate::lists::incremental::{Member, State};
 use crate::lists::sight::TriangleRun;
-use crate::scene::{Entity, LightMethod, Placement};
+use crate::scene::{LightMethod, Placement};
 use crate::scene_buffers::{self, FieldSlot, Slot};
 use crate::sh::rotation::turns;
 use glam::DVec3;
@@ -33,7 +33,7 @@ impl Frame {
         }));
         let bounds: Vec<EntityBounds> = bounds.collect();
         let entities = of_entities().map(|(index, p)| {
-            let lamp_bit = if self.is_lamp_at_rest(index, p) { LAMP_AT_REST } else { 0 };
+            let lamp_bit = if self.ends_links(index, p) { LAMP_AT_REST } else { 0 };
             let sun_bits = sun_bits.get(&index).copied().unwrap_or(lamp_bit);
             layout::DeviceEntity { sun_bits, light_maps: light_maps[index], ..self.entity(index, p) }
         });
@@ -219,10 +219,11 @@ impl Frame {
         }
     }
 
-    /// Whether light that bounces between what rests knows of a lamp, as links end at it.
-    fn is_lamp_at_rest(&self, index: usize, placement: &Placement) -> bool {
-        let Entity { emits, transparent, .. } = self.scene.entities[index];
-        emits && !transparent && self.scene.is_at_rest(index) && *placement == self.scene.data.entities[index].fixed()
+    /// Whether links of what rests end at a lamp.
+    fn ends_links(&self, index: usize, placement: &Placement) -> bool {
+        self.scene.is_lamp_at_rest(index)
+            && self.groups.is_seen_by_own(index)
+            && *placement == self.scene.data.entities[index].fixed()
     }
 
     pub(super) fn box_slot(&self, entity: usize, number: usize) -> Slot<PlacedCuboid> {

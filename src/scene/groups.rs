@@ -69,6 +69,11 @@ impl Groups {
             || (self.transparent[entity] && self.is_seen(entity))
     }
 
+    /// Whether others of its own group are lit.
+    pub fn is_seen_by_own(&self, entity: usize) -> bool {
+        self.receivers[self.of[entity] as usize] > u32::from(self.receives[entity])
+    }
+
     /// Whether a receiver's own visibility has the shadow of an occluder: they never move against each other, and it
     /// lets no light through.
     pub fn is_own(&self, receiver: usize, occluder: usize) -> bool {
@@ -143,6 +148,8 @@ mod tests {
         let groups = Groups::new(&scene, Lights::Sharp);
         assert_eq!(groups.members(), [vec![0, 2, 3], vec![1]]);
         assert!(groups.is_own(0, 3) && !groups.is_own(0, 1));
+        assert_eq!([0, 1, 2].map(|entity| groups.is_seen_by_own(entity)), [true, false, true]);
+        assert!(!Groups::alone(&scene).is_seen_by_own(0));
         scene.loosen(0);
         assert_eq!(Groups::new(&scene, Lights::Sharp).members(), [vec![0], vec![1], vec![2, 3]]);
         scene.data.entities[3].movable = true;

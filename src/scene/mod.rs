@@ -348,6 +348,12 @@ impl Scene {
         self.is_at_rest(entity) && !transparent && opacity >= 1.0
     }
 
+    /// Whether an entity is a lamp at rest, which light that bounces within its group does not pass.
+    pub(crate) fn is_lamp_at_rest(&self, entity: usize) -> bool {
+        let Entity { emits, transparent, .. } = self.entities[entity];
+        emits && !transparent && self.is_at_rest(entity)
+    }
+
     /// The nodes that carry an entity, none where it rests: entities with the same ones never move against each other.
     /// `None` of one that has movements of its own, is movable or was taken out of its group.
     pub(crate) fn carriers(&self, entity: usize) -> Option<&[Motion]> {

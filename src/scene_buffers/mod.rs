@@ -7,7 +7,7 @@ pub mod limits;
 pub mod silhouettes;
 mod textures;
 
-use crate::bake::cluster_order::{ClusterOrder, RunEnds, cluster_order};
+use crate::bake::cluster_order::{ClusterOrder, RunEnds};
 use crate::bake::ensure::Baked;
 use crate::bake::{self, BakedScene, BakedSurface};
 use crate::draw::DrawnMesh;
@@ -138,8 +138,7 @@ impl Packing {
         let mesh = &baked.mesh;
         let (centre, _) = mesh.bounding_sphere();
         let vertex_first = vertices.len() as u32;
-        let ClusterOrder { vertices: order, runs } =
-            cluster_order(mesh, baked.under_lamps.as_ref().map(|under| &under[..]));
+        let ClusterOrder { vertices: order, runs } = baked.order();
         let drawn = DrawnMesh::new(device, mesh, &order, *drawn, by_triangles)?;
         let steps = drawn.grid().map_or_else(|| mesh.steps(), |grid| vec![grid.step_m; order.len()]);
         let longest = || steps.iter().copied().fold(0.0, f32::max);
